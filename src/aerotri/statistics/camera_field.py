@@ -2,9 +2,10 @@
 
 The adjustment takes image errors for noise. What all photographs of a camera share bends a surface that is measured in
 them, however many cells there are. [D] As in `cluster_fields` camera k has the errors s_k = B·p_k at its rays, p_k its
-nodes over the format with the covariance σ_s²·R, and the scores h = BᵀPv the covariance σ0²·K + σ_s²·K·R·K. Here the
-noise is not known beforehand: σ̂0 of the adjustment holds the field. With γ = σ_s²/σ0², the eigenvalues λ of K^½·R·K^½,
-z = h in their directions, whitened, and the redundancy r the restricted likelihood is that of
+nodes over the format with the covariance σ_s²·R, R = exp(−ρ²/2ℓ²), and the scores h = BᵀPv have the covariance
+σ0²·K + σ_s²·K·R·K. Here the noise is not known beforehand: σ̂0 of the adjustment holds the field. With γ = σ_s²/σ0²,
+the eigenvalues λ of K^½·R·K^½, z = h in their directions, whitened, and the redundancy r the restricted likelihood is
+that of
 
     r·ln Ω(γ) + Σ ln(1 + γλ),   Ω(γ) = vᵀPv − Σ z²·γλ/(1 + γλ),   σ0² = Ω/r.
 
@@ -21,7 +22,6 @@ import numpy as np
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.cluster_fields import (
     KEPT,
-    LENGTHS,
     SIZES,
     FieldEquations,
     correlations,
@@ -30,9 +30,17 @@ from aerotri.statistics.cluster_fields import (
     node_counts,
     nodes_at,
 )
-from aerotri.statistics.cluster_test import LEVEL, SAME
+from aerotri.statistics.cluster_test import LEVEL
 from aerotri.statistics.clusters import CAMERA, LARGE, Clusters
 
+LENGTHS = (0.2, 0.28, 0.4)
+"""Correlation lengths looked at, in half diagonals of the format; chosen [C]: longer ones explain the residuals as
+well, and σ of heights is then up to twice the errors of simulated cameras of which parameters were estimated."""
+SEEN = 1e-4
+"""Eigenvalue of K over the largest below which a pattern does not count; chosen [C]: the unknowns take nearly all of it
+up, and what is left shows where the iterations ended."""
+LEAST = 1e-12
+"""Of vᵀPv that no field explains: rounding."""
 MOST_CAMERAS = 12
 """Cameras with a field each at most; chosen [C]: each has seventy columns in the equations."""
 
@@ -43,8 +51,9 @@ class CameraField:
 
     Parameters
     ----------
-    sigma : mm, of an image coordinate. length : mm. smooth : whether R is exp(−ρ²/2ℓ²), else exp(−ρ/ℓ).
+    sigma : mm, of an image coordinate. length : mm.
     gain : twice the logarithm of the likelihood with the field over that without.
+    noise : σ0 of what the field leaves as noise, dimensionless; σ̂0 of the adjustment holds both.
     root : (nodes, k) of σ_s²·R. half : (c, 2) mm, half formats of all cameras. counts : nodes along x and y.
     part : (c,) place of a camera among those with photographs, −1 for others.
     by_unknowns : (6n + s, 2·m·k) F·R^½ of the unknowns of the reduced system; columns by part, component and pattern.
@@ -52,8 +61,8 @@ class CameraField:
 
     sigma: float
     length: float
-    smooth: bool
     gain: float
+    noise: float
     root: np.ndarray
     half: np.ndarray
     counts: tuple[int, int]
@@ -92,10 +101,10 @@ def camera_field(found: Adjustment) -> CameraField | None:
     factor = system.factorise(solution.equations)
     one = Clusters(CAMERA, np.zeros(len(u.images), np.int64), ("",), 1)
     equations = field_equations(system, solution, factor, one)
-    gain, variance, length, smooth = _most_likely(found, equations, squares)
+    gain, variance, noise, length = _most_likely(found, equations, squares)
     if np.exp(-0.5 * gain) >= LEVEL:
         return None
-    power, patterns = np.linalg.eigh(variance * correlations(system, length, smooth))
+    power, patterns = np.linalg.eigh(variance * correlations(system, length, True))
     kept = power > KEPT * power[-1]
     root = patterns[:, kept] * np.sqrt(power[kept])
     sides = equations.sides.reshape(len(equations.sides), -1, len(root)) @ root
@@ -105,12 +114,20 @@ def camera_field(found: Adjustment) -> CameraField | None:
     by_unknowns[: 6 * len(u.images)] *= u.eo_free.reshape(-1, 1)
     half = np.array([camera.half_format_mm for camera in u.block.cameras])
     return CameraField(
-        float(np.sqrt(variance)), length, smooth, gain, root, half, node_counts(system), part, by_unknowns
+        float(np.sqrt(variance)),
+        length,
+        gain,
+        float(np.sqrt(noise)),
+        root,
+        half,
+        node_counts(system),
+        part,
+        by_unknowns,
     )
 
 
-def _most_likely(found: Adjustment, equations: FieldEquations, squares: float) -> tuple[float, float, float, bool]:
-    """Twice the gain of the logarithm of the likelihood, σ_s² mm², length mm, and the form.
+def _most_likely(found: Adjustment, equations: FieldEquations, squares: float) -> tuple[float, float, float, float]:
+    """Twice the gain of the logarithm of the likelihood, σ_s² mm², σ0², and length mm.
 
     Parameters
     ----------
@@ -118,22 +135,22 @@ def _most_likely(found: Adjustment, equations: FieldEquations, squares: float) -
     """
     system, redundancy = found.system, found.local.outcome.redundancy
     values, vectors = np.linalg.eigh(equations.normals)
-    there = values > SAME * values[-1]
+    there = values > SEEN * values[-1]
     root = vectors[:, there] * np.sqrt(values[there])
     z = (vectors[:, there].T @ equations.scores) / np.sqrt(values[there])
     spread = root.reshape(2 * len(equations.camera), equations.nodes.count, -1)
     unit, half = float(np.median(1.0 / system.unknowns.rays.inv_sigma)), float(np.hypot(*half_format(system)))
     sizes = (unit * SIZES) ** 2
-    best = (0.0, 0.0, half, False)
-    for smooth in (False, True):
-        for length in LENGTHS:
-            r = correlations(system, half * length, smooth)
-            power, patterns = np.linalg.eigh(np.einsum("cip,ij,cjq->pq", spread, r, spread, optimize=True))
-            grown = sizes[:, None] * np.maximum(power, 0.0)
-            explained = np.sum((patterns.T @ z) ** 2 * grown / (1.0 + grown), axis=1)
-            left = np.maximum(squares - explained, 1e-12 * squares)
-            gains = redundancy * np.log(squares / left) - np.sum(np.log1p(grown), axis=1)
-            n = int(np.argmax(gains))
-            if gains[n] > best[0]:
-                best = (float(gains[n]), float(sizes[n] * left[n] / redundancy), half * length, smooth)
+    best = (0.0, 0.0, squares / redundancy, half)
+    for length in half * np.array(LENGTHS):
+        r = correlations(system, length, True)
+        power, patterns = np.linalg.eigh(np.einsum("cip,ij,cjq->pq", spread, r, spread, optimize=True))
+        grown = sizes[:, None] * np.maximum(power, 0.0)
+        explained = np.sum((patterns.T @ z) ** 2 * grown / (1.0 + grown), axis=1)
+        left = np.maximum(squares - explained, LEAST * squares)
+        gains = redundancy * np.log(squares / left) - np.sum(np.log1p(grown), axis=1)
+        n = int(np.argmax(gains))
+        if gains[n] > best[0]:
+            noise = float(left[n]) / redundancy
+            best = (float(gains[n]), float(sizes[n]) * noise, noise, float(length))
     return best

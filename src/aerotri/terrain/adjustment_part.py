@@ -2,9 +2,9 @@
 
 [D] The ideal rays l = m − d(m; p) of a picket give dP = −G·(∂π/∂θ·dθ + ∂d/∂p·dp), G = (AᵀA)⁻¹Aᵀ of its intersection.
 With J = dP/dx over all unknowns x of the reduced system its covariance is σ̂0²·J·Q·Jᵀ, by a solution with the factor.
-Where groups of photographs share errors it has a model part, and where the residuals show that the parameters leave image
-errors, the part of these, through the orientation and at the rays of the picket itself (`statistics.camera_field`). It
-changes slowly over the ground: some pickets tell it for all.
+Where groups of photographs share errors it has a model part. Where the residuals show that the parameters leave image
+errors it has the part of these, through the orientation and at the rays of the picket itself
+(`statistics.camera_field`). It changes slowly over the ground: some pickets tell it for all.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ def _covariances(
         by_columns = np.ascontiguousarray(j.reshape(-1, count).T)
         q = factor.solve(by_columns)
         both = np.einsum("nau,unb->nab", j, q.reshape(count, len(j), size))
-        covariance = calibration.local.outcome.sigma0**2 * both
+        covariance = (calibration.local.outcome.sigma0 if left is None else left.noise) ** 2 * both
         if calibration.model is not None and not (left is not None and is_of_camera(calibration)):
             covariance = covariance + model_of_functions(
                 calibration.system, calibration.solution, calibration.model, by_columns, q, size
@@ -194,7 +194,7 @@ def _by_unknowns(
     calibration: Adjustment, restitution: Restitution, rows: np.ndarray, local: np.ndarray, photographs: np.ndarray,
     plan: bool,
 ) -> np.ndarray:  # fmt: skip
-    """(n, 3, u + f) partials of intersected points by the unknowns of the reduced system, then by the patterns of errors.
+    """(n, 3, u + f) partials of intersected points by the unknowns of the reduced system, then by patterns of errors.
 
     plan : whether the height is known, so that one ray gives X and Y; the partials of Z are 0.
     """
