@@ -16,6 +16,7 @@ parameters describe a part of the field both cancel.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -43,6 +44,9 @@ LEAST = 1e-12
 """Of vᵀPv that no field explains: rounding."""
 MOST_CAMERAS = 12
 """Cameras with a field each at most; chosen [C]: each has seventy columns in the equations."""
+
+
+_KNOWN: WeakKeyDictionary[Adjustment, CameraField | None] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +85,13 @@ class CameraField:
         ray = np.arange(len(gain))
         out[ray, :, self.part[camera]] = gain[:, :, :, None] * self.at(xy, camera)[:, None, None, :]
         return out.reshape(len(gain), gain.shape[1], -1)
+
+
+def known_field(found: Adjustment) -> CameraField | None:
+    """As `camera_field`, found once for an adjustment while it is in use."""
+    if found not in _KNOWN:
+        _KNOWN[found] = camera_field(found)
+    return _KNOWN[found]
 
 
 def is_of_camera(found: Adjustment) -> bool:
