@@ -15,6 +15,8 @@ from aerotri.statistics.camera_field import CameraField, camera_field
 from aerotri.statistics.cluster_fields import Field, half_format, node_counts, root_of_field
 from aerotri.statistics.clusters import Clusters
 from aerotri.terrain.adjustment_part import variances_at
+from aerotri.volume.pickets import Pickets
+from aerotri.volume.response import respond
 from small_blocks import with_adjustment
 
 SIGMA_UM = 1.0
@@ -84,6 +86,28 @@ def test_what_lens_parameters_leave_is_in_sigma_of_points_measured_later():
             into.append(np.mean(error**2 / variances_at(found, restitution, *given)[:, 2]))
     assert np.sqrt(np.mean(before)) > 2.0
     assert 0.6 < np.sqrt(np.mean(after)) < 1.4
+
+
+def test_a_volume_has_the_part_that_its_places_have():
+    """A functional that is the height of one place: its model part is that of the place, by other code."""
+    found = adjust_keeping_system(simulated(3, "brown:K1+K2", 5.0)[0])
+    block, left = found.local.block, camera_field(found)
+    assert left is not None
+    tie = np.setdiff1d(np.flatnonzero(found.local.points.rays >= 3), block.control.point)[:5]
+    xyz, seen = found.result.points.xyz[tie], rays_of(block, tie)
+    same_noise = replace(left, noise=found.local.outcome.sigma0)
+    given = np.arange(len(block.images)), xyz, seen
+    without, whole = (
+        variances_at(found, replace(restitution_of(found), left=one), *given)[:, 2] for one in (None, same_noise)
+    )
+    for k in range(len(tie)):
+        images = seen[k][seen[k] >= 0].astype(np.int64)
+        start = np.array([0, len(images)], np.int64)
+        picket = Pickets(xyz[k : k + 1], start, images, np.full(len(images), 1e-3), np.ones(1))
+        response = respond(found, picket, np.array([[0.0, 0.0, 1.0]]))
+        assert response.variance == pytest.approx(without[k], rel=1e-3)
+        # errors of rays are bilinear between nodes here
+        assert response.model == pytest.approx(whole[k] - without[k], rel=0.02)
 
 
 def test_what_parameters_describe_moves_nothing():
