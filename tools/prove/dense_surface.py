@@ -411,6 +411,9 @@ def cells_of(found: DenseSurface, flight, name: str) -> Cells:
     lasting = Lasting(*lasting_errors(o.pixel, float(np.median(o.photographs.gsd)) * 2**o.level))
     for window, part in o.files.read_all(list(o.windows)):
         grid = o.grid.window(window.row, window.column, window.rows, window.columns)
+        if min(grid.rows, grid.columns) < 2:
+            # a last row or column of cells by itself has no slope
+            continue
         truth = truth_on(grid, flight)
         judged = np.ones(truth.shape, bool)
         if name in JUDGED:
