@@ -84,7 +84,7 @@ class CameraField:
         out = np.zeros((len(gain), gain.shape[1], self.by_unknowns.shape[1] // (2 * k), 2, k))
         ray = np.arange(len(gain))
         out[ray, :, self.part[camera]] = gain[:, :, :, None] * self.at(xy, camera)[:, None, None, :]
-        return out.reshape(len(gain), gain.shape[1], -1)
+        return out.reshape(len(gain), gain.shape[1], self.by_unknowns.shape[1])
 
 
 def known_field(found: Adjustment) -> CameraField | None:
