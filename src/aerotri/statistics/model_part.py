@@ -8,6 +8,7 @@ clusters passes the test of `cluster_test`.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,13 +16,23 @@ import numpy as np
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.adjustment.unknowns import Unknowns
 from aerotri.quantiles import normal_quantile, student_quantile
+from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.model_part import ClusterTest, ModelPart, ModelRoot
 from aerotri.statistics.cluster_fields import Field, compare_field
 from aerotri.statistics.cluster_influence import influences, known_part
-from aerotri.statistics.cluster_test import LEVEL, compare_clusters, untestable, weakest_modes
-from aerotri.statistics.clusters import CAMERA, LARGE, PHOTOGRAPH, Clusters, cluster_schemes
+from aerotri.statistics.cluster_test import (
+    LEVEL,
+    Squares,
+    compare_clusters,
+    sum_of_squares,
+    untestable,
+    weakest_modes,
+)
+from aerotri.statistics.clusters import CAMERA, LARGE, PHOTOGRAPH, Clusters
 from aerotri.statistics.covariance import InnerDatum, orientation_cofactors
+from aerotri.statistics.summarise import OF_POINTS
 
 FEWEST_PHOTOGRAPHS = 10
 """Photographs from which clusters are looked for [C]."""
@@ -47,55 +58,82 @@ class Excess:
     root: ModelRoot
 
 
-def why_not(system: NormalSystem, solution: Solution, sigma0: float) -> str:
-    """Why a block has no model part from clusters, '' where it can have one."""
-    u = system.unknowns
-    if u.block.settings.adjustment.model_part == "off":
+def why_not(model_part: str, photographs: int, status: str, sigma0: float) -> str:
+    """Why a block has no model part from clusters, '' where it can have one.
+
+    Parameters
+    ----------
+    model_part : as the settings say. status : of the adjustment.
+    """
+    if model_part == "off":
         return "switched off"
-    if len(u.images) < FEWEST_PHOTOGRAPHS:
+    if photographs < FEWEST_PHOTOGRAPHS:
         return f"there are fewer than {FEWEST_PHOTOGRAPHS} photographs"
-    if solution.status != "converged" or not sigma0 > 0.0:
+    if status != "converged" or not sigma0 > 0.0:
         return "the adjustment has no final σ0"
     return ""
 
 
 def compare_schemes(
-    system: NormalSystem, solution: Solution, factor: Factor, sigma0: float
-) -> tuple[tuple[Clusters, ...], tuple[ClusterTest, ...]]:
-    """All ways to divide the photographs, and their tests, at LEVEL together (Bonferroni).
+    schemes: Sequence[Clusters], centre: np.ndarray, sigma0: float, prepare: Callable[[], Squares]
+) -> tuple[ClusterTest, ...]:
+    """Tests of all ways to divide the photographs, at LEVEL together (Bonferroni).
+
+    Parameters
+    ----------
+    centre : (n, 3) m, of the photographs. prepare : gives what sums of squares are computed by, where they are needed.
+    """
+    tested = sum(not untestable(clusters) for clusters in schemes)
+    if not tested:
+        return tuple(ClusterTest(c.scheme, len(c), reason=untestable(c)) for c in schemes)
+    squares = prepare()
+    return tuple(compare_clusters(squares, clusters, centre, sigma0, LEVEL / tested) for clusters in schemes)
+
+
+def squares_by(system: NormalSystem, solution: Solution, factor: Factor) -> Squares:
+    """The sums of squares of clusters along the weakest modes of a block.
 
     Parameters
     ----------
     factor : undamped, at the solution.
     """
-    schemes = cluster_schemes(system.unknowns, solution.state)
-    tested = sum(not untestable(clusters) for clusters in schemes)
-    if not tested:
-        return schemes, tuple(ClusterTest(c.scheme, len(c), reason=untestable(c)) for c in schemes)
     modes = weakest_modes(system, solution, factor)
-    return schemes, tuple(
-        compare_clusters(system, solution, factor, modes, clusters, sigma0, LEVEL / tested) for clusters in schemes
-    )
+    return lambda clusters: sum_of_squares(system, solution, factor, modes, clusters)
 
 
 def compare_few(
-    system: NormalSystem, solution: Solution, factor: Factor, schemes: tuple[Clusters, ...],
-    tests: tuple[ClusterTest, ...], sigma0: float,
+    schemes: Sequence[Clusters], tests: tuple[ClusterTest, ...], centre: np.ndarray,
+    fitted: Callable[[Clusters], Field],
 ) -> tuple[tuple[ClusterTest, ...], dict[int, Field]]:  # fmt: skip
     """Schemes of too few clusters tested by random fields, where no scheme of strips, days … could be tested otherwise.
+
+    Parameters
+    ----------
+    centre : (n, 3) m, of the photographs. fitted : gives the random field that fits clusters best.
 
     Returns
     -------
     the tests, and the fields by the number of their scheme.
     """
     several = [k for k, one in enumerate(schemes) if one.scheme not in (CAMERA, PHOTOGRAPH)]
-    if any(not tests[k].reason for k in several) or len(system.unknowns.images) > LARGE:
+    if any(not tests[k].reason for k in several) or len(centre) > LARGE:
         return tests, {}
-    found = {
-        k: compare_field(system, solution, factor, schemes[k], sigma0, LEVEL / len(several)) for k in several
-    }  # fmt: skip
+    found = {k: compare_field(fitted, schemes[k], centre, LEVEL / len(several)) for k in several}
     compared = tuple(found[k][0] if k in found else test for k, test in enumerate(tests))
     return compared, {k: field for k, (_, field) in found.items()}
+
+
+def chosen_scheme(tests: Sequence[ClusterTest]) -> int | None:
+    """The number of the scheme with the largest ratio of those that count; single photographs where no other does."""
+    counting = [(test.scheme != PHOTOGRAPH, test.ratio, k) for k, test in enumerate(tests) if test.counts]
+    return max(counting)[2] if counting else None
+
+
+def why_none(tests: Sequence[ClusterTest]) -> str:
+    """Why no scheme counts."""
+    if tests and all(test.reason for test in tests):
+        return tests[0].reason
+    return "no group of photographs has errors that noise does not explain"
 
 
 def excess_of_clusters(
@@ -119,8 +157,7 @@ def excess_of_clusters(
         widening * sigma0**2,
     )  # fmt: skip
     points = np.zeros_like(q_points)
-    # as of a variance of m values about their mean [L]; it makes good for what only one cluster determines
-    freedom = widening * m / (m - 1)
+    freedom = freedom_of(m)
     for c, change in enumerate(influences(system, solution, factor, clusters)):
         columns = tuple(part[..., None] for part in change)
         columns = columns if inner is None else inner.moved(*columns)
@@ -131,6 +168,12 @@ def excess_of_clusters(
     shared = positive_part((root.shared @ root.shared.T - root.noise * noise[1])[None])[0]
     points = positive_part(freedom * points - root.noise * noise[2])
     return Excess(orientation_cofactors(system.unknowns, solution.state, images), shared, points, root)
+
+
+def freedom_of(clusters: int) -> float:
+    """What the sum over so many clusters is multiplied with."""
+    # as of a variance of m values about their mean [L]; it makes good for what only one cluster determines
+    return of_few(clusters) * clusters / (clusters - 1)
 
 
 def of_few(clusters: int) -> float:
@@ -161,6 +204,28 @@ def positive_part(covariance: np.ndarray) -> np.ndarray:
     values, vectors = np.linalg.eigh(covariance / (scale[:, :, None] * scale[:, None, :]))
     kept = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
     return kept * scale[:, :, None] * scale[:, None, :]
+
+
+def spread_over_block(unknowns: Unknowns, local: AdjustedBlock, excess: Excess, part: ModelPart) -> AdjustedBlock:
+    """The local result with the model part `part` in the rows of the block."""
+    u = unknowns
+    points, images = np.full_like(local.points.covariance, np.nan), np.full_like(local.images.covariance, np.nan)
+    points[u.points], images[u.images] = excess.points, excess.images
+    return replace(
+        local,
+        points=replace(local.points, model=points),
+        images=replace(local.images, model=images),
+        parameters=replace(local.parameters, model=of_parameters(u.shared.kinds, excess.shared, len(local.parameters))),
+        model_part=part,
+    )
+
+
+def of_parameters(kinds: Sequence[str], shared: np.ndarray, count: int) -> np.ndarray:
+    """(count, count) model part of the parameters that are told, from that of all shared ones (s, s)."""
+    own = np.flatnonzero(~np.isin(np.array(kinds, dtype=object).astype(str), OF_POINTS))
+    model = np.zeros((count, count))
+    model[: len(own), : len(own)] = shared[np.ix_(own, own)]
+    return model
 
 
 def with_ratios(part: ModelPart, sigma: np.ndarray, model: np.ndarray) -> ModelPart:
