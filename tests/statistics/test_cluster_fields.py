@@ -57,7 +57,7 @@ def test_columns_of_the_unknowns_are_those_of_dense_algebra(small):
     found, clusters, equations, design, basis, _ = small
     field = fitted_field(found.system, found.solution, _factor(found), 1.0, clusters)
     root = np.random.default_rng(1).normal(size=(equations.nodes.count, 2))
-    made = root_of_field(found.system, found.solution, _factor(found), clusters, replace(field, root=root))
+    made, squares = root_of_field(found.system, found.solution, _factor(found), clusters, replace(field, root=root))
     scale = 1.0 / np.linalg.norm(design, axis=0)
     right = (design * scale).T @ basis @ np.kron(np.eye(6), root)
     expected = np.linalg.solve((design * scale).T @ (design * scale), right) * scale[:, None]

@@ -6,8 +6,6 @@ import time
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from aerotri.diagnosis.moving_errors import model_part_in_words
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.adjustment import Adjustment
@@ -23,6 +21,7 @@ from aerotri.statistics.model_part import (
     compare_schemes,
     excess_of_clusters,
     excess_of_root,
+    growth_of,
     spread_over_block,
     squares_by,
     why_none,
@@ -54,8 +53,8 @@ def with_model_part(found: Adjustment) -> Adjustment:
     if u.block.settings.adjustment.datum == "inner" and u.motions.count:
         inner = inner_datum(system, solution.state, factor, solution.estimator)
     if chosen in fields:
-        root = root_of_field(system, solution, factor, clusters, fields[chosen], inner)
-        excess = excess_of_root(system, solution, root)
+        root, squares = root_of_field(system, solution, factor, clusters, fields[chosen], inner)
+        excess = excess_of_root(system, solution, root, squares)
     elif inner is not None:
         q = cofactors(system, solution.state, factor, solution.estimator)
         excess = excess_of_clusters(system, solution, factor, clusters, sigma0, q.images, q.shared, q.points, inner)
@@ -64,10 +63,8 @@ def with_model_part(found: Adjustment) -> Adjustment:
             system, solution, factor, clusters, sigma0, factor.inverse_on_pattern().blocks[: len(u.images)].copy(),
             factor.border_inverse(), found.local.points.covariance[u.points] / sigma0**2,
         )  # fmt: skip
-    local = spread_over_block(u, found.local, excess, part)
-    assert local.points.model is not None
-    model = np.sqrt(np.diagonal(local.points.model, axis1=1, axis2=2))
-    local = replace(local, model_part=with_ratios(part, local.points.sigma, model))
+    part = with_ratios(part, growth_of(found.local.points.covariance[u.points], excess.points))
+    local = replace(spread_over_block(u, found.local, excess.images, excess.shared, excess.points), model_part=part)
     return replace(_with(found, local, begun), model=excess.root)
 
 

@@ -13,7 +13,7 @@ eliminated beforehand: it does not move. The unknowns get from the fields the co
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -109,30 +109,46 @@ def compare_field(
 def root_of_field(
     system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters, field: Field,
     inner: InnerDatum | None = None,
-) -> ModelRoot:  # fmt: skip
-    """The columns F of the fields, see above; in the inner datum where there is one."""
+) -> tuple[ModelRoot, np.ndarray]:  # fmt: skip
+    """The columns F of the fields, see above, and F·Fᵀ of the points (P, 3, 3); in the inner datum if there is one."""
     u = system.unknowns
-    n, s, count = len(u.images), len(u.shared), len(u.points)
     equations = field_equations(system, solution, factor, clusters)
-    size, k, m = equations.nodes.count, field.root.shape[1], len(equations.camera)
-    apart = equations.sides.reshape(6 * n + s, 2 * m, size) @ field.root
-    x = factor.solve(np.ascontiguousarray(apart.reshape(6 * n + s, 2 * m * k)))
-    images = x[: 6 * n].reshape(n, 6, -1) * u.eo_free[:, :, None]
-    shared, points = x[6 * n :], np.empty((count, 3, 2 * m * k), np.float32)
-    problem = system.problem(solution.state, solution.estimator)
+    x = factor.solve(of_patterns(equations.sides, field.root))
+    images, shared = x[: 6 * len(u.images)].reshape(len(u.images), 6, -1), x[6 * len(u.images) :]
+    images = images * u.eo_free[:, :, None]
+    points, squares = np.empty((len(u.points), 3, x.shape[1]), np.float32), np.zeros((len(u.points), 3, 3))
+    for own, columns in columns_of_points(system, solution, equations.nodes, field.root, x):
+        points[:, :, own] = columns
+        squares += columns @ np.swapaxes(columns, 1, 2)
+    if inner is not None:
+        images, shared, points = inner.moved(images, shared, points)
+        squares = points @ np.swapaxes(points, 1, 2)
+    return ModelRoot(images, shared, points.astype(np.float32, copy=False), 0.0), squares
+
+
+def of_patterns(sides: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """(6n + s, ·) sides of the patterns, root (nodes, k), from those of the nodes of all clusters."""
+    apart = sides.reshape(len(sides), -1, len(root)) @ root
+    return np.ascontiguousarray(apart.reshape(len(sides), -1))
+
+
+def columns_of_points(
+    system: NormalSystem, solution: Settled, nodes: _kernels.Nodes, root: np.ndarray, x: np.ndarray
+) -> Iterator[tuple[slice, np.ndarray]]:
+    """Some columns after others and the solutions of the points (P, 3, ·), from all of `of_patterns`, x (6n + s, ·)."""
+    u, k = system.unknowns, root.shape[1]
+    n, count = len(u.images), len(u.points)
+    m, problem = x.shape[1] // (2 * k), system.problem(solution.state, solution.estimator)
     at_once = max(int(NUMBERS_AT_ONCE / (6 * max(count, 1) * k)), 1)
     for first in range(0, m, at_once):
         parts = slice(first, min(first + at_once, m))
         own = slice(2 * k * parts.start, 2 * k * parts.stop)
-        columns = field_point_sides(system, problem, equations.nodes, field.root, parts)
-        of_images, of_shared = np.ascontiguousarray(images[:, :, own]), np.ascontiguousarray(shared[:, own])
-        points[:, :, own] = expand_sides(system, solution.state, of_images, of_shared, columns, solution.estimator)
-    if inner is not None:
-        images, shared, points = inner.moved(images, shared, points)
-    return ModelRoot(images, shared, points.astype(np.float32, copy=False), 0.0)
+        sides = _point_sides(system, problem, nodes, root, parts)
+        images, shared = np.ascontiguousarray(x[: 6 * n, own]).reshape(n, 6, -1), np.ascontiguousarray(x[6 * n :, own])
+        yield own, expand_sides(system, solution.state, images, shared, sides, solution.estimator)
 
 
-def field_point_sides(
+def _point_sides(
     system: NormalSystem, problem: Problem, nodes: _kernels.Nodes, root: np.ndarray, parts: slice
 ) -> np.ndarray:
     """A_pᵀP·B·R (P, 3, ·) of some parts; rays of others have no weight."""

@@ -39,6 +39,8 @@ from aerotri.statistics.covariance import InnerDatum
 
 LOWERED, PLAIN_SHARE = 0.9, 0.493
 """t and a of the power −½, see above."""
+MOST_COLUMNS = 48
+"""Columns of the root of what is known beforehand; of more, so many random sums stand for all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +125,7 @@ def _with_lower_weights(
 
 
 def known_part(
-    system: NormalSystem, solution: Solution, factor: Factor, most: int = 48, inner: InnerDatum | None = None
+    system: NormalSystem, solution: Solution, factor: Factor, most: int = MOST_COLUMNS, inner: InnerDatum | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Q·N_0·Q of photographs (n, 6, 6), shared parameters (s, s) and points (P, 3, 3).
 
@@ -141,10 +143,7 @@ def known_part(
     order = order_by_place(solution.state.points[rows])
     rows, axes = rows[order], axes[order]
     root = system.priors.root()
-    of_points, size = np.sqrt(u.prior_weight[rows, axes]), len(rows) + root.shape[1]
-    mix = np.eye(size)
-    if size > most:
-        mix = np.random.default_rng(size).choice([-1.0, 1.0], (size, most)) / np.sqrt(most)
+    of_points, mix = np.sqrt(u.prior_weight[rows, axes]), mixed_columns(len(rows) + root.shape[1], most)
     images, shared, points = np.zeros((n, 6, 6)), np.zeros((s, s)), np.zeros((count, 3, 3))
     at_once = int(np.clip(NUMBERS_AT_ONCE / (3 * max(count, 1)), 1, max(mix.shape[1], 1)))
     for first in range(0, mix.shape[1], at_once):
@@ -157,3 +156,10 @@ def known_part(
         shared += of_shared @ of_shared.T
         points += at_points @ np.swapaxes(at_points, 1, 2)
     return images * (u.eo_free[:, :, None] & u.eo_free[:, None, :]), shared, points
+
+
+def mixed_columns(size: int, most: int = MOST_COLUMNS) -> np.ndarray:
+    """(size, k) sums over `size` columns of a root: the columns themselves, or random sums with signs of many."""
+    if size <= most:
+        return np.eye(size)
+    return np.random.default_rng(size).choice([-1.0, 1.0], (size, most)) / np.sqrt(most)

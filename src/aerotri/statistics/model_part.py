@@ -24,6 +24,7 @@ from aerotri.statistics.cluster_fields import Field, compare_field
 from aerotri.statistics.cluster_influence import influences, known_part
 from aerotri.statistics.cluster_test import (
     LEVEL,
+    Settled,
     Squares,
     compare_clusters,
     sum_of_squares,
@@ -38,8 +39,6 @@ FEWEST_PHOTOGRAPHS = 10
 """Photographs from which clusters are looked for [C]."""
 COVERED = 0.95
 """Probability for which the model part of few clusters is widened [C]: what a surveyor quotes."""
-POINTS_AT_ONCE = 4096
-"""Object points whose columns are held in double precision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,13 +185,9 @@ def of_few(clusters: int) -> float:
     return (student_quantile(upper, clusters - 1) / normal_quantile(upper)) ** 2
 
 
-def excess_of_root(system: NormalSystem, solution: Solution, root: ModelRoot) -> Excess:
-    """The model part F·Fᵀ of a root that has no noise in it."""
+def excess_of_root(system: NormalSystem, solution: Settled, root: ModelRoot, points: np.ndarray) -> Excess:
+    """The model part F·Fᵀ of a root that has no noise in it, of the points given (P, 3, 3)."""
     images = root.images @ np.swapaxes(root.images, 1, 2)
-    points = np.empty((len(root.points), 3, 3))
-    for first in range(0, len(points), POINTS_AT_ONCE):
-        own = root.points[first : first + POINTS_AT_ONCE].astype(float)
-        points[first : first + POINTS_AT_ONCE] = own @ np.swapaxes(own, 1, 2)
     shared = root.shared @ root.shared.T
     return Excess(orientation_cofactors(system.unknowns, solution.state, images), shared, points, root)
 
@@ -206,17 +201,23 @@ def positive_part(covariance: np.ndarray) -> np.ndarray:
     return kept * scale[:, :, None] * scale[:, None, :]
 
 
-def spread_over_block(unknowns: Unknowns, local: AdjustedBlock, excess: Excess, part: ModelPart) -> AdjustedBlock:
-    """The local result with the model part `part` in the rows of the block."""
+def spread_over_block(
+    unknowns: Unknowns, local: AdjustedBlock, images: np.ndarray, shared: np.ndarray, points: np.ndarray
+) -> AdjustedBlock:
+    """The local result with the model part in the rows of the block.
+
+    Parameters
+    ----------
+    images (n, 6, 6), shared (s, s), points (P, 3, 3) : as in `Excess`.
+    """
     u = unknowns
-    points, images = np.full_like(local.points.covariance, np.nan), np.full_like(local.images.covariance, np.nan)
-    points[u.points], images[u.images] = excess.points, excess.images
+    of_points, of_images = np.full_like(local.points.covariance, np.nan), np.full_like(local.images.covariance, np.nan)
+    of_points[u.points], of_images[u.images] = points, images
     return replace(
         local,
-        points=replace(local.points, model=points),
-        images=replace(local.images, model=images),
-        parameters=replace(local.parameters, model=of_parameters(u.shared.kinds, excess.shared, len(local.parameters))),
-        model_part=part,
+        points=replace(local.points, model=of_points),
+        images=replace(local.images, model=of_images),
+        parameters=replace(local.parameters, model=of_parameters(u.shared.kinds, shared, len(local.parameters))),
     )
 
 
@@ -228,15 +229,15 @@ def of_parameters(kinds: Sequence[str], shared: np.ndarray, count: int) -> np.nd
     return model
 
 
-def with_ratios(part: ModelPart, sigma: np.ndarray, model: np.ndarray) -> ModelPart:
-    """The record with the medians of σ total over σ of the object points.
-
-    Parameters
-    ----------
-    sigma, model : (N, 3) m, σ of the points and its model part.
-    """
+def growth_of(covariance: np.ndarray, model: np.ndarray) -> np.ndarray:
+    """(N, 3) σ total over σ of points, from their covariance and its model part (N, 3, 3)."""
+    sigma, of_model = (np.sqrt(np.diagonal(part, axis1=1, axis2=2)) for part in (covariance, model))
     with np.errstate(divide="ignore", invalid="ignore"):
-        growth = np.sqrt(sigma**2 + model**2) / sigma
+        return np.sqrt(sigma**2 + of_model**2) / sigma
+
+
+def with_ratios(part: ModelPart, growth: np.ndarray) -> ModelPart:
+    """The record with the medians of σ total over σ of the object points, (N, 3)."""
     known = np.isfinite(growth).all(axis=1)
     if not known.any():
         return part

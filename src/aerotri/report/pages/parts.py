@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from aerotri.partition.whole import NO_MODEL_PART, Whole
+from aerotri.partition.whole import Whole
 from aerotri.report.pages.adjustment import Findings, filled_page, page_content
 from aerotri.report.plots.overview import all_plots
 from aerotri.report.plots.rendering import RenderedPlot, render_plots
@@ -55,7 +55,6 @@ def parts_html(whole: Whole, plots: Mapping[str, Figure | RenderedPlot]) -> str:
         "images": tables.images(everything),
         "photograph_residuals": photograph_tables.photograph_residuals_table(picture.residuals, everything),
     }
-    content["first"] = [text for text in record.outcome.warnings if text.startswith(NO_MODEL_PART)]
     content["sampled"] = _sampled(whole, drawn)
     return filled_page(content)
 
