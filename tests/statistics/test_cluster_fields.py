@@ -69,6 +69,8 @@ def test_columns_of_the_unknowns_are_those_of_dense_algebra(small):
         (made.points.reshape(-1, 12), expected[n + s :]),
     ):
         assert part == pytest.approx(of_dense, abs=1e-5 * np.abs(of_dense).max())
+    own = expected[n + s :].reshape(-1, 3, 12)
+    assert squares == pytest.approx(own @ np.swapaxes(own, 1, 2), abs=1e-5 * np.max(own**2))
 
 
 def test_white_noise_is_no_field():

@@ -152,8 +152,14 @@ def test_positive_part():
     rng = np.random.default_rng(1)
     root = rng.normal(size=(4, 3, 3))
     whole = root @ np.swapaxes(root, 1, 2)
-    assert positive_part(whole) == pytest.approx(whole)
-    assert np.linalg.eigvalsh(positive_part(whole - 2.0 * np.eye(3))).min() > -1e-12
+    nothing = np.zeros_like(whole)
+    assert positive_part(whole, nothing) == pytest.approx(whole)
+    assert np.linalg.eigvalsh(positive_part(whole, nothing + 2.0 * np.eye(3))).min() > -1e-12
+    for left in (1e-3, 1e-6, -1e-6):
+        # noise explains nearly all of one variance: the others do not grow with it
+        noise = np.diag([0.1, 0.1, whole[0, 2, 2] - left])[None]
+        found = positive_part(whole[:1], noise)[0]
+        assert (np.diagonal(found) < 2.0 * np.diagonal(whole[0])).all()
 
 
 def _tested(block):

@@ -137,7 +137,7 @@ def group_part(grouped: Grouped, task: PartTask) -> Grown:
     q: Cofactors = files.object(MEASURED)[1]
     noise, freedom = of_few(m) * grouped.sigma0**2, freedom_of(m)
     images, points = (
-        positive_part(freedom * part @ np.swapaxes(part, 1, 2) - noise * (of_all - known))
+        positive_part(freedom * part @ np.swapaxes(part, 1, 2), noise * (of_all - known))
         for part, of_all, known in zip(
             (change.images, change.points), (q.images, q.points), files.object(KNOWN), strict=True
         )

@@ -184,7 +184,7 @@ class _PartsModel:
         for own, part in zip(common.of_shared, grown, strict=True):
             change[own] = part.shared
         noise = of_few(m) * self._sigma0**2 * (self._solver.inverse - known)
-        return grown, positive_part((freedom_of(m) * change @ change.T - noise)[None])[0]
+        return grown, positive_part(freedom_of(m) * (change @ change.T)[None], noise[None])[0]
 
     def _known(self) -> np.ndarray:
         """Q·N_0·Q of the shared parameters (s, s); that of photographs and points in the files of the parts."""

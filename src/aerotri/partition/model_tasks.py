@@ -189,7 +189,8 @@ def field_part(labelled: Labelled, task: PartTask) -> None:
 def observed_rows(system: NormalSystem) -> tuple[np.ndarray, np.ndarray]:
     """Rows and axes of the coordinates of points that are observed."""
     u = system.unknowns
-    return np.nonzero((u.prior_weight > 0.0) & (u.kept < 0)[:, None])
+    rows, axes = np.nonzero((u.prior_weight > 0.0) & (u.kept < 0)[:, None])
+    return rows, axes
 
 
 def _unit_sides(system: NormalSystem, probing: Probing) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -104,7 +104,9 @@ def pulls_of_clusters(
             value = np.einsum("gkt,gt->gk", rows.by_image[own], along.images[image, :, c])
             for column, there, by in _shared_of(rows.columns[own], rows.by_shared[own]):
                 value[there] += by * along.shared[column, c[there], None]
-        np.add.at(whole.images, (image, slice(None), c), np.einsum("gkt,gk->gt", rows.by_image[own], value))
+        pulls = np.einsum("gkt,gk->gt", rows.by_image[own], value)
+        for k in range(6):
+            np.add.at(whole.images[:, k], (image, c), pulls[:, k])
         for column, there, by in _shared_of(rows.columns[own], rows.by_shared[own]):
             np.add.at(whole.shared, (column, c[there]), np.sum(by * value[there], axis=1))
     return out

@@ -37,6 +37,8 @@ from aerotri.statistics.summarise import OF_POINTS
 
 FEWEST_PHOTOGRAPHS = 10
 """Photographs from which clusters are looked for [C]."""
+LEAST_LEFT = 0.1
+"""Share of a variance and of what noise explains of it, that a covariance is scaled by at least [C]."""
 COVERED = 0.95
 """Probability for which the model part of few clusters is widened [C]: what a surveyor quotes."""
 
@@ -163,9 +165,9 @@ def excess_of_clusters(
         for into, values in zip((root.images, root.shared, root.points), columns, strict=True):
             into[..., c : c + 1] = np.sqrt(freedom) * values
         points += columns[2] @ np.swapaxes(columns[2], 1, 2)
-    images = positive_part(root.images @ np.swapaxes(root.images, 1, 2) - root.noise * noise[0])
-    shared = positive_part((root.shared @ root.shared.T - root.noise * noise[1])[None])[0]
-    points = positive_part(freedom * points - root.noise * noise[2])
+    images = positive_part(root.images @ np.swapaxes(root.images, 1, 2), root.noise * noise[0])
+    shared = positive_part((root.shared @ root.shared.T)[None], root.noise * noise[1][None])[0]
+    points = positive_part(freedom * points, root.noise * noise[2])
     return Excess(orientation_cofactors(system.unknowns, solution.state, images), shared, points, root)
 
 
@@ -192,11 +194,19 @@ def excess_of_root(system: NormalSystem, solution: Settled, root: ModelRoot, poi
     return Excess(orientation_cofactors(system.unknowns, solution.state, images), shared, points, root)
 
 
-def positive_part(covariance: np.ndarray) -> np.ndarray:
-    """(k, d, d) symmetric matrices without their negative eigenvalues, each scaled to its own diagonal first."""
-    scale = np.sqrt(np.abs(np.diagonal(covariance, axis1=1, axis2=2)))
+def positive_part(covariance: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Covariances less what noise explains of them, (k, d, d) both, without negative eigenvalues.
+
+    Each is scaled to its own diagonal first, or to a share of both where little of the diagonal is left: scaled to
+    nothing, the other variances would grow without bound.
+    """
+    rest = covariance - noise
+    left, both = (
+        np.abs(np.diagonal(part, axis1=1, axis2=2)) for part in (rest, np.abs(covariance) + np.abs(noise))
+    )  # fmt: skip
+    scale = np.sqrt(np.maximum(left, LEAST_LEFT * both))
     scale = np.where(scale > 0.0, scale, 1.0)
-    values, vectors = np.linalg.eigh(covariance / (scale[:, :, None] * scale[:, None, :]))
+    values, vectors = np.linalg.eigh(rest / (scale[:, :, None] * scale[:, None, :]))
     kept = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
     return kept * scale[:, :, None] * scale[:, None, :]
 
