@@ -43,8 +43,14 @@ OWN_MEMORY = """
 def own_memory_mb():
     with open("/proc/self/status") as file:
         return next(int(line.split()[1]) / 1024 for line in file if line.startswith("VmHWM"))
+
+def processor_s():
+    import resource
+    of = [resource.getrusage(one) for one in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in of)
 """
-"""Peak of a program. What getrusage says of it begins with the memory of the script that started it."""
+"""Peak of a program, and its time of the processor. What getrusage says of memory begins with that of the script that
+started it."""
 ONE = (
     OWN_MEMORY
     + """
@@ -55,7 +61,7 @@ start = time.perf_counter()
 found = aerotri.adjust(block, model_part=sys.argv[3], explain=False)
 seconds = time.perf_counter() - start
 found.save(sys.argv[2], plots=False)
-print(json.dumps([seconds, time.perf_counter() - begun, own_memory_mb()]))
+print(json.dumps([seconds, time.perf_counter() - begun, processor_s(), own_memory_mb()]))
 """
 )
 PARTS = (
@@ -67,7 +73,7 @@ if __name__ == "__main__":
     found = aerotri.adjust_parts(sys.argv[1], sys.argv[2], plots=False, executor=sys.argv[3])
     seconds = time.perf_counter() - start
     of_children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-    print(json.dumps([seconds, own_memory_mb(), of_children]))
+    print(json.dumps([seconds, processor_s(), own_memory_mb(), of_children]))
 """
 )
 """Programs that print their time in s and their memory in MB."""
@@ -154,10 +160,11 @@ def main() -> None:
     how = f"processes:{options.processes}"
     whole = run(folder, ONE, folder / "block", folder / "one", options.model_part)
     parts = run(folder, PARTS, folder / "in_parts", folder / "parts", how)
-    print("| adjusted | s | with reading and writing | peak memory MB | of a process |\n|---|---|---|---|---|")
-    print(f"| in one piece, every σ | {whole[0]:.1f} | {whole[1]:.1f} | {whole[2]:.0f} | |")
+    print("| adjusted | s | with reading and writing | of the processor | peak memory MB | of a process |")
+    print("|---|---|---|---|---|---|")
+    print(f"| in one piece, every σ | {whole[0]:.1f} | {whole[1]:.1f} | {whole[2]:.1f} | {whole[3]:.0f} | |")
     how_many = f"in {options.parts} parts, {options.processes} processes"
-    print(f"| {how_many} | | {parts[0]:.1f} | {parts[1]:.0f} | {parts[2]:.0f} |")
+    print(f"| {how_many} | | {parts[0]:.1f} | {parts[1]:.1f} | {parts[2]:.0f} | {parts[3]:.0f} |")
     print(f"\nDividing took {divided:.1f} s. Tables are read and written, nothing is drawn.\n")
     print("| ends | | compared | largest difference over σ | largest relative difference of σ | of total σ |")
     print("|---|---|---|---|---|---|", flush=True)

@@ -142,7 +142,7 @@ def _drawn(whole: Whole) -> tuple[AdjustedBlock, np.ndarray]:
         block=block,
         images=replace(
             found, centre=found.centre[rows], angles=found.angles[rows], covariance=found.covariance[rows],
-            rays=found.rays[rows],
+            rays=found.rays[rows], model=None if found.model is None else found.model[rows],
         ),
         rays=replace(results, **{key: getattr(results, key)[own] for key in keys}),
     ), rows  # fmt: skip
