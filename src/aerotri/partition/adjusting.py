@@ -128,6 +128,7 @@ def _with_sigma(
         observations=observations, unknowns=unknowns, conditions=0, redundancy=observations - unknowns,
     )  # fmt: skip
     model = model_part_of(course, place, first, ended.status, sigma0, photographs)
+    course.begin("tables")
     ending = Ending(place.at, outcome, (out / PARTS).resolve(), every, place_of_block, model.part, model.shared)
     written: list[Written] = course.run(write_part, ending)
     parameters = parameters_of(common.labels, place.at.shared, corner.inverse, common.weighted, sigma0)

@@ -115,12 +115,14 @@ class _PartsModel:
 
     def found(self) -> FoundModel:
         """The tests, and where a scheme counts what it does to all unknowns."""
+        self._course.begin("model part of σ, tests")
         schemes = cluster_schemes(self._block, self._rows, self._centre)
         tests = compare_schemes(schemes, self._centre, self._sigma0, self._squares)
         tests, fields = compare_few(schemes, tests, self._centre, self._fitted)
         part, chosen = ModelPart(level=LEVEL, tests=tests), chosen_scheme(tests)
         if chosen is None:
             return FoundModel(replace(part, reason=why_none(tests)))
+        self._course.begin("model part of σ")
         clusters = schemes[chosen]
         part = replace(part, scheme=clusters.scheme, clusters=len(clusters))
         if chosen in fields:
@@ -210,6 +212,7 @@ class _PartsModel:
         turning = Descending(Labelled(self._at, clusters, before), 0)
         solver.solve(before, pull_part, turning)
         for number in range(MOST_TURNS):
+            self._course.begin(f"model part of σ, turn {number + 1}")
             sides = solver.next_sides()
             turning = replace(turning, labelled=replace(turning.labelled, sides=sides), number=number, before=before)
             found, _ = solver.solve(sides, turn_part, turning)

@@ -68,6 +68,8 @@ def parts_table(whole: Whole) -> Table:
     """The parts side by side; every number is of all rays of the part."""
     rows = whole.picture.parts
     digits = metre_digits(np.array([row.sigma for row in rows]))
+    model = whole.record.model_part
+    total = "total " if model is not None and model.counts else ""
     return table(
         "The parts",
         (Column("part"), [row.name for row in rows]),
@@ -79,7 +81,7 @@ def parts_table(whole: Whole) -> Table:
         (Column("largest |w|", "", ".1f"), [row.largest_w for row in rows]),
         (Column("rays beyond the test", "", "d"), [row.beyond for row in rows]),
         *(
-            (Column(f"σ{axis}, median", "m", f".{digits}f"), [row.sigma[k] for row in rows])
+            (Column(f"{total}σ{axis}, median", "m", f".{digits}f"), [row.sigma[k] for row in rows])
             for k, axis in enumerate("XYZ")
         ),
     )
