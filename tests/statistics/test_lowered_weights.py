@@ -9,13 +9,12 @@ from aerotri.statistics.clusters import cluster_schemes
 from aerotri.statistics.lowered_weights import (
     MOST_TURNS,
     SMALL,
-    expanded,
     first_turn,
     lengths,
+    lowered_sides,
     next_turn,
     products,
-    pulls_of_clusters,
-    reduced,
+    with_points,
 )
 from small_blocks import small_block
 from statistics_blocks import drone_block
@@ -24,20 +23,16 @@ from statistics_blocks import drone_block
 def solved(system, solution, label, m, t):
     """Solutions of the whole block as one part, and how many turns they took."""
     factor = system.factorise(solution.equations)
-
-    def back(sides):
-        return expanded(system, solution, factor.solve(reduced(system, solution, sides)), sides)
-
-    scores = pulls_of_clusters(system, solution, label, m)
-    plain = back(scores)
-    turn = first_turn(scores, plain, pulls_of_clusters(system, solution, label, m, plain))
-    at = lengths(products(turn, t), None)
+    scores = lowered_sides(system, solution, label, m, t)
+    turn = first_turn(scores, factor.solve(scores), scores)
+    turn = turn.with_pulled(lowered_sides(system, solution, label, m, t, turn.z))
+    at = lengths(products(turn), None)
     for k in range(MOST_TURNS):
         if at.arrived:
-            return plain, turn.x, k
-        turn = next_turn(turn, back(turn.w), at, t)
-        turn = turn.with_pulled(pulls_of_clusters(system, solution, label, m, turn.z))
-        at = lengths(products(turn, t), at)
+            return with_points(system, solution, label, t, turn.x), k
+        turn = next_turn(turn, factor.solve(turn.w), at)
+        turn = turn.with_pulled(lowered_sides(system, solution, label, m, t, turn.z))
+        at = lengths(products(turn), at)
     raise AssertionError("no end")
 
 
@@ -53,20 +48,15 @@ def test_they_are_those_of_a_factor_for_each(which, t):
     u = system.unknowns
     clusters = cluster_schemes(u.block, u.images, solution.state.centre)[0]
     factor = system.factorise(solution.equations)
-    plain = list(influences(system, solution, factor, clusters, t, 1.0))
-    lowered = list(influences(system, solution, system.factorise(solution.equations), clusters, t, 0.0))
-    to_first_order, x, turns = solved(system, solution, clusters.label, len(clusters), t)
+    lowered = list(influences(system, solution, factor, clusters, t, 0.0))
+    x, turns = solved(system, solution, clusters.label, len(clusters), t)
     # the error falls by (1 - sqrt(1 - t)) / (1 + sqrt(1 - t)) a turn at least
     root = np.sqrt(1.0 - t)
     assert turns <= 1 + np.log(2.0 / SMALL) / np.log((1.0 + root) / (1.0 - root))
     # where an adjustment ends, the scores of all clusters do not add up to nothing: both differ by that
-    for expected, values, share in ((plain, to_first_order, 1e-9), (lowered, x, 1e-6)):
-        for c, change in enumerate(expected):
-            flat = np.concatenate([change.images.ravel(), change.shared, change.points.ravel()])
-            n, s = change.images.size, len(u.shared)
-            for own in (slice(0, n), slice(n, n + s), slice(n + s, None)):
-                apart = np.abs(values[own, c] - flat[own]).max(initial=0.0)
-                assert apart <= share * np.abs(flat[own]).max(initial=0.0)
+    for c, change in enumerate(lowered):
+        for expected, values in zip(change, x, strict=True):
+            assert np.abs(values[..., c] - expected).max(initial=0.0) <= 1e-6 * np.abs(expected).max(initial=0.0)
 
 
 def test_clusters_without_a_score_stand_still():

@@ -12,18 +12,16 @@ from aerotri.partition.part_results import MEASURED, MODEL
 from aerotri.partition.part_tasks import At, PartTask
 from aerotri.partition.side_tasks import Sides, followed, keep_reduced
 from aerotri.statistics.cluster_fields import columns_of_points, field_sums, nodes_of, of_patterns
-from aerotri.statistics.cluster_influence import LOWERED, PLAIN_SHARE
+from aerotri.statistics.cluster_influence import LOWERED, PLAIN_SHARE, plain_changes, plain_sides
 from aerotri.statistics.covariance import Cofactors, orientation_cofactors
 from aerotri.statistics.lowered_weights import (
     Lengths,
     Turn,
-    expanded,
     first_turn,
+    lowered_sides,
     next_turn,
     products,
-    pulls_of_clusters,
-    reduced,
-    split,
+    with_points,
 )
 from aerotri.statistics.model_part import freedom_of, growth_of, of_few, positive_part
 
@@ -63,10 +61,9 @@ class Patterns:
 
 @dataclass(frozen=True, eq=False)
 class Grouped:
-    """A model part that is to be computed: of so many clusters, whose solutions are those of turn `number`."""
+    """A model part that is to be computed: of clusters whose solutions are those of turn `number`."""
 
-    at: At
-    clusters: int
+    labelled: Labelled
     number: int
     sigma0: float
 
@@ -101,11 +98,11 @@ def held_part(sides_at: tuple[At, Sides], task: PartTask) -> None:
 
 
 def pull_part(d: Descending, task: PartTask) -> None:
-    """Leave the scores of the clusters."""
+    """Leave the scores of the clusters, with the points eliminated with all and with lowered weights."""
     s, own = Standing.of(d.labelled.at, task), d.labelled.own(task)
-    scores = pulls_of_clusters(s.system, s, own.label, len(own))
+    scores = lowered_sides(s.system, s, own.label, len(own), LOWERED)
     task.files.keep_array(SCORES, scores)
-    keep_reduced(s.factor, d.labelled.sides, reduced(s.system, s, scores), task)
+    keep_reduced(s.factor, d.labelled.sides, np.hstack([plain_sides(s.system, s, own), scores]), task)
 
 
 def turn_part(d: Descending, task: PartTask) -> np.ndarray:
@@ -114,36 +111,36 @@ def turn_part(d: Descending, task: PartTask) -> np.ndarray:
     assert d.before is not None
     x = followed(s.factor, d.before, task)
     if d.lengths is None:
-        scores = files.array(SCORES)
-        back = expanded(s.system, s, x, scores)
-        files.keep_array(PLAIN, back)
-        turn = first_turn(scores, back, pulls_of_clusters(s.system, s, own.label, len(own), back))
+        plain, back = np.hsplit(x, 2)
+        files.keep_array(PLAIN, plain)
+        turn = first_turn(files.array(SCORES), back, back)
     else:
-        turn = Turn(*files.array(f"{TURN}_{d.number - 1}"))
-        turn = next_turn(turn, expanded(s.system, s, x, turn.w), d.lengths, LOWERED)
-        turn = turn.with_pulled(pulls_of_clusters(s.system, s, own.label, len(own), turn.z))
+        turn = next_turn(Turn(*files.array(f"{TURN}_{d.number - 1}")), x, d.lengths)
+    pulled = lowered_sides(s.system, s, own.label, len(own), LOWERED, np.ascontiguousarray(turn.z))
+    turn = turn.with_pulled(pulled)
     files.keep_array(f"{TURN}_{d.number}", turn.stacked())
-    keep_reduced(s.factor, d.labelled.sides, reduced(s.system, s, turn.w), task)
-    return products(turn, LOWERED)
+    keep_reduced(s.factor, d.labelled.sides, pulled, task)
+    return products(turn)
 
 
 def group_part(grouped: Grouped, task: PartTask) -> Grown:
     """The model part of photographs and points from the clusters, as `excess_of_clusters` has it."""
-    files, m = task.files, grouped.clusters
-    system = files.system(grouped.at.positions).system
-    u, state = system.unknowns, files.state(grouped.at.state, grouped.at.shared[task.shared])
+    labelled, files = grouped.labelled, task.files
+    s, own = Standing.of(labelled.at, task), labelled.own(task)
     x = Turn(*files.array(f"{TURN}_{grouped.number}")).x
-    change = split(PLAIN_SHARE * files.array(PLAIN) + (1.0 - PLAIN_SHARE) * x, 6 * len(u.images), len(u.shared))
-    q: Cofactors = files.object(MEASURED)[1]
-    noise, freedom = of_few(m) * grouped.sigma0**2, freedom_of(m)
-    images, points = (
-        positive_part(freedom * part @ np.swapaxes(part, 1, 2), noise * (of_all - known))
-        for part, of_all, known in zip(
-            (change.images, change.points), (q.images, q.points), files.object(KNOWN), strict=True
-        )
+    plain = plain_changes(s.system, s, own, files.array(PLAIN))
+    lowered = with_points(s.system, s, own.label, LOWERED, x)
+    images, shared, points = (
+        PLAIN_SHARE * one + (1.0 - PLAIN_SHARE) * other for one, other in zip(plain, lowered, strict=True)
     )
-    files.keep_object(MODEL, (orientation_cofactors(u, state, images), points))
-    return Grown(growth_of(grouped.sigma0**2 * q.points, points), change.shared)
+    q: Cofactors = files.object(MEASURED)[1]
+    noise, freedom = of_few(len(own)) * grouped.sigma0**2, freedom_of(len(own))
+    of_images, of_points = (
+        positive_part(freedom * part @ np.swapaxes(part, 1, 2), noise * (of_all - known))
+        for part, of_all, known in zip((images, points), (q.images, q.points), files.object(KNOWN), strict=True)
+    )
+    files.keep_object(MODEL, (orientation_cofactors(s.system.unknowns, s.state, of_images), of_points))
+    return Grown(growth_of(grouped.sigma0**2 * q.points, of_points), shared)
 
 
 def pattern_part(patterns: Patterns, task: PartTask) -> None:

@@ -179,8 +179,9 @@ class _PartsModel:
     def _of_groups(self, clusters: Clusters) -> tuple[list[Grown], np.ndarray]:
         """What the clusters do less what noise explains of it, as `excess_of_clusters` has it."""
         known, m = self._known(), len(clusters)
-        number = self._descended(clusters)
-        grown: list[Grown] = self._course.run(group_part, Grouped(self._at, m, number, self._sigma0))
+        turning = self._descended(clusters)
+        grouped = Grouped(turning.labelled, turning.number, self._sigma0)
+        grown: list[Grown] = self._course.run(group_part, grouped)
         common = self._course.common
         change = np.zeros((len(common.labels), m))
         for own, part in zip(common.of_shared, grown, strict=True):
@@ -206,8 +207,8 @@ class _PartsModel:
         self._solver.drop(sides)
         return shared @ shared.T
 
-    def _descended(self, clusters: Clusters) -> int:
-        """The solutions with lowered weights put into the files of the parts; the number of their turn."""
+    def _descended(self, clusters: Clusters) -> Descending:
+        """The solutions with lowered weights put into the files of the parts; their last turn."""
         solver, before = self._solver, self._solver.next_sides()
         turning = Descending(Labelled(self._at, clusters, before), 0)
         solver.solve(before, pull_part, turning)
@@ -223,7 +224,7 @@ class _PartsModel:
             if turning.lengths is not None and turning.lengths.arrived:
                 break
         solver.drop(before)
-        return turning.number
+        return turning
 
 
 def _sample(parts: Sequence[Described]) -> np.ndarray:

@@ -147,44 +147,6 @@ def cluster_sides(first, last, problem, label, modes, sides, work):
 
 
 @kernel
-def own_pulls(first, last, problem, label, y, sides, work):
-    """N_c·y_c = A_cᵀP·A·y_c of every cluster c, y_c column c of `y`; A_cᵀPv where `y` has none. Nothing is eliminated.
-
-    Of the points first..last; label (n,). y, sides : `Directions`, the sides are added to.
-    """
-    rays, table, at, points, weighting = (
-        problem.rays, problem.table, problem.values, problem.points, problem.weighting,
-    )  # fmt: skip
-    start, image = rays.start, rays.image
-    by_eo, by_pt, by_sh, whitened = work.by_eo, work.by_pt, work.by_sh, work.whitened
-    columns, n_columns, union = work.columns, work.n_columns, work.union
-    images, shared, by_point = y.images, y.shared, y.points
-    of_images, of_shared, of_points = sides.images, sides.shared, sides.points
-    given = images.shape[2] > 0
-    for p in range(first, last):
-        linearise_point(p, rays, table, at, points, weighting, work)
-        for q in range(start[p + 1] - start[p]):
-            i = image[start[p] + q]
-            c = label[i]
-            for row in range(2):
-                value = whitened[q, row]
-                if given:
-                    value = 0.0
-                    for t in range(E):
-                        value += by_eo[q, row, t] * images[i, t, c]
-                    for t in range(3):
-                        value += by_pt[q, row, t] * by_point[p, t, c]
-                    for t in range(n_columns[q]):
-                        value += by_sh[q, row, t] * shared[union[columns[q, t]], c]
-                for t in range(E):
-                    of_images[i, t, c] += by_eo[q, row, t] * value
-                for t in range(3):
-                    of_points[p, t, c] += by_pt[q, row, t] * value
-                for t in range(n_columns[q]):
-                    of_shared[union[columns[q, t]], c] += by_sh[q, row, t] * value
-
-
-@kernel
 def point_pulls(first, last, problem, label, first_label, sides, work):
     """A_cᵀPv of the points first..last, added to `sides` (P, 3, m), of the clusters first_label .. first_label + m."""
     rays, table, at, points, weighting = (

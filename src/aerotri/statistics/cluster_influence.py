@@ -33,7 +33,7 @@ from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.statistics import _cluster_kernels as _kernels
-from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, sides_of_clusters
+from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, Settled, sides_of_clusters
 from aerotri.statistics.clusters import Clusters, order_by_place
 from aerotri.statistics.covariance import InnerDatum
 
@@ -82,10 +82,21 @@ def influences(
 
 def _plain_changes(system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters) -> Directions:
     """Q·g_c of every cluster: images (n, 6, m), shared (s, m), points (P, 3, m)."""
+    x = factor.solve(plain_sides(system, solution, clusters))
+    return plain_changes(system, solution, clusters, x)
+
+
+def plain_sides(system: NormalSystem, solution: Settled, clusters: Clusters) -> np.ndarray:
+    """The scores g_c with the points eliminated, (6·n + s, m)."""
+    u = system.unknowns
+    nothing = Directions(np.zeros((len(u.images), 6, 0)), np.zeros((len(u.shared), 0)), np.zeros((len(u.points), 3, 0)))
+    return sides_of_clusters(system, solution, clusters, nothing)[0]
+
+
+def plain_changes(system: NormalSystem, solution: Settled, clusters: Clusters, x: np.ndarray) -> Directions:
+    """Q·g_c of every cluster from that of photographs and shared parameters, x (6·n + s, m)."""
     u, m = system.unknowns, len(clusters)
-    n, s, count = len(u.images), len(u.shared), len(u.points)
-    nothing = Directions(np.zeros((n, 6, 0)), np.zeros((s, 0)), np.zeros((count, 3, 0)))
-    x = factor.solve(sides_of_clusters(system, solution, clusters, nothing)[0])
+    n, count = len(u.images), len(u.points)
     images, shared, points = x[: 6 * n].reshape(n, 6, m) * u.eo_free[:, :, None], x[6 * n :], np.empty((count, 3, m))
     label, problem = clusters.label.astype(np.int64), system.problem(solution.state, solution.estimator)
     at_once = int(np.clip(NUMBERS_AT_ONCE / (3 * max(count, 1)), 1, m))
