@@ -114,7 +114,7 @@ def planned_block(photographs: int, of_a_part: int, along_reach: int) -> tuple[s
     in_a_row = sum(max(joints[k].flops for k in level) for level in tree.upwards())
     minute = 60.0 * MULTIPLICATIONS_A_SECOND
     of_factors = own.entries * parts + sum(joint.numbers for joint in joints)
-    columns = DIRECTIONS + CONTROL + (TURNS + 1) * CLUSTERS + TESTS * 6 * CLUSTERS / 2
+    columns = DIRECTIONS + CONTROL + (TURNS + 2) * CLUSTERS + TESTS * 6 * CLUSTERS / 2
     passes = 2 * (TURNS + 3) + TESTS
     read = 8e-9 * passes * (own.entries * parts + sum(joint.kept for joint in joints))
     numbers = (
