@@ -80,10 +80,8 @@ def subtract_border(rows, union, n_union, c, couple_shared):
 
 
 @kernel
-def assemble(first, last, problem, offsets, sums, work):
-    """Reduced normal equations of points first..last, added to `sums`.
-
-    offsets : the numbers of the first photograph and of the first pair in `sums`.
+def assemble(first, last, problem, places, sums, work):
+    """Reduced normal equations of points first..last, added to `sums` at their `places`.
 
     Returns the cost, the part of the Newton decrement that belongs to the points, and the number of a point that its
     rays do not determine (−1 when all are).
@@ -93,9 +91,9 @@ def assemble(first, last, problem, offsets, sums, work):
     )  # fmt: skip
     start, image = rays.start, rays.image
     pair_start, pair_block = problem.pairs.start, problem.pairs.block
-    diagonal, pairs, border, corner = sums.diagonal, sums.pairs, sums.border, sums.corner
+    blocks, border, corner = sums.blocks, sums.border, sums.corner
     right, right_shared, squares, squares_shared = sums.right, sums.right_shared, sums.squares, sums.squares_shared
-    first_image, first_pair = offsets
+    place_of_image, place_of_block = places.image, places.block
     by_eo, by_sh, whitened, columns, n_columns = work.by_eo, work.by_sh, work.whitened, work.columns, work.n_columns
     union, couple, couple_shared = work.union, work.couple, work.couple_shared
     misclosure = np.zeros(3)
@@ -112,14 +110,14 @@ def assemble(first, last, problem, offsets, sums, work):
         decrement += y0 * y0 + y1 * y1 + y2 * y2
         pair = pair_start[p]
         for q in range(n_rays):
-            i = image[start[p] + q] - first_image
-            add_own_block(diagonal[i], by_eo[q], couple[q])
+            i = place_of_image[image[start[p] + q]]
+            add_own_block(blocks[place_of_block[image[start[p] + q]]], by_eo[q], couple[q])
             add_own_side(right[i], squares[i], by_eo[q], couple[q], whitened[q], misclosure)
             if n_union:
                 add_own_border(border[i], union, columns[q], n_columns[q], by_eo[q], by_sh[q])
                 subtract_border(border[i], union, n_union, couple[q], couple_shared)
             for other in range(q + 1, n_rays):
-                subtract_rank_three(pairs[pair_block[pair] - first_pair], couple[q], couple[other])
+                subtract_rank_three(blocks[place_of_block[pair_block[pair]]], couple[q], couple[other])
                 pair += 1
             for t in range(n_columns[q]):
                 column, s0, s1 = union[columns[q, t]], by_sh[q, 0, t], by_sh[q, 1, t]
@@ -136,10 +134,10 @@ def assemble(first, last, problem, offsets, sums, work):
 
 
 @kernel
-def reduce_right_side(first, last, problem, first_image, right, right_shared, work):
+def reduce_right_side(first, last, problem, place_of_image, right, right_shared, work):
     """The right side alone of `assemble`: what is left of every misclosure when the point has taken its own step.
 
-    right (ni, 6), right_shared (s) are added to. Returns as `assemble` does.
+    right (·, 6), at the places (n,) of the photographs, and right_shared (s,) are added to. Returns as `assemble` does.
     """
     rays, table, values, points, weighting, damping = (
         problem.rays, problem.table, problem.values, problem.points, problem.weighting, problem.damping,
@@ -160,7 +158,7 @@ def reduce_right_side(first, last, problem, first_image, right, right_shared, wo
         decrement += d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
         solve_transposed(lower, d)
         for q in range(n_rays):
-            i = image[start[p] + q] - first_image
+            i = place_of_image[image[start[p] + q]]
             for row in range(2):
                 own = by_pt[q, row, 0] * d[0] + by_pt[q, row, 1] * d[1] + by_pt[q, row, 2] * d[2]
                 left = whitened[q, row] - own

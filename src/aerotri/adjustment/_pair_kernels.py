@@ -8,13 +8,18 @@ from aerotri.compiled import kernel, leaf_kernel
 
 
 @kernel
-def count_pairs(start, image, first_pair):
-    """How many pairs of rays of a point begin with each photograph: in first_pair (n + 1,), zeros, summed up, out."""
-    for p in range(len(start) - 1):
-        for q in range(start[p], start[p + 1]):
-            first_pair[image[q] + 1] += start[p + 1] - 1 - q
-    for i in range(len(first_pair) - 1):
-        first_pair[i + 1] += first_pair[i]
+def order_by(key, place, items, order):
+    """The items in order of their keys, those of one key as they come, in order (m,), out.
+
+    Parameters
+    ----------
+    key : of every item. place : (number of keys,) where the items of each begin; where they end, out.
+    """
+    for k in range(len(items)):
+        item = items[k]
+        at = place[key[item]]
+        order[at] = item
+        place[key[item]] = at + 1
 
 
 @leaf_kernel
@@ -37,13 +42,12 @@ def sort_first(numbers, count):
 
 
 @kernel
-def number_pairs(start, image, tied, first_pair, number, tie_number, codes):
+def number_pairs(rays, tied, first_number, number, tie_number, codes):
     """Numbers of the different pairs of photographs, rising by the first and then by the second.
 
     Parameters
     ----------
-    image : (m,) of the rays, rising within a point. tied : (t, 2) pairs, the smaller first, rising by it.
-    first_pair : (n + 1,) as `count_pairs` leaves it.
+    tied : (t, 2) pairs, the smaller first, rising by it. first_number : of the first pair.
     number : (pairs of rays,) out, in the order the assembly meets them. tie_number : (t,) out.
     codes : (pairs of rays + t,) out, first·n + second of the different pairs.
 
@@ -51,26 +55,20 @@ def number_pairs(start, image, tied, first_pair, number, tie_number, codes):
     -------
     How many different pairs there are.
     """
-    n = len(first_pair) - 1
-    second, place = np.empty(len(number), np.int64), np.empty(len(number), np.int64)
-    next_place = first_pair.copy()
-    k = 0
-    for p in range(len(start) - 1):
-        for q in range(start[p], start[p + 1]):
-            for other in range(q + 1, start[p + 1]):
-                at = next_place[image[q]]
-                second[at], place[at] = image[other], k
-                next_place[image[q]] += 1
-                k += 1
+    start, image, point, pair_start = rays.start, rays.image, rays.point, rays.pair_start
+    by_image, first_ray = rays.by_image, rays.first_ray
+    n = len(first_ray) - 1
     number_of = np.full(n, -1, np.int64)
     partners = np.empty(n, np.int64)
     count, tie = 0, 0
     for i in range(n):
         n_partners, first_tie = 0, tie
-        for k in range(first_pair[i], first_pair[i + 1]):
-            if number_of[second[k]] < 0:
-                number_of[second[k]], partners[n_partners] = 0, second[k]
-                n_partners += 1
+        for k in range(first_ray[i], first_ray[i + 1]):
+            ray = by_image[k]
+            for other in range(ray + 1, start[point[ray] + 1]):
+                if number_of[image[other]] < 0:
+                    number_of[image[other]], partners[n_partners] = 0, image[other]
+                    n_partners += 1
         while tie < len(tied) and tied[tie, 0] == i:
             if number_of[tied[tie, 1]] < 0:
                 number_of[tied[tie, 1]], partners[n_partners] = 0, tied[tie, 1]
@@ -78,10 +76,17 @@ def number_pairs(start, image, tied, first_pair, number, tie_number, codes):
             tie += 1
         sort_first(partners, n_partners)
         for k in range(n_partners):
-            codes[count], number_of[partners[k]] = i * n + partners[k], count
+            codes[count], number_of[partners[k]] = i * n + partners[k], first_number + count
             count += 1
-        for k in range(first_pair[i], first_pair[i + 1]):
-            number[place[k]] = number_of[second[k]]
+        for k in range(first_ray[i], first_ray[i + 1]):
+            ray = by_image[k]
+            p = point[ray]
+            before = ray - start[p]
+            # of the rays of the point before this one, each with all that follow it
+            at = pair_start[p] + before * (start[p + 1] - start[p]) - before * (before + 1) // 2
+            for other in range(ray + 1, start[p + 1]):
+                number[at] = number_of[image[other]]
+                at += 1
         for k in range(first_tie, tie):
             tie_number[k] = number_of[tied[k, 1]]
         for k in range(n_partners):

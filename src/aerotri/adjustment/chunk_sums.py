@@ -2,70 +2,113 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from aerotri.adjustment.kernel_records import Sums
+from aerotri.adjustment.kernel_records import Places, Sums
 from aerotri.adjustment.unknowns import Unknowns
 from aerotri.functional_model.observed_unknowns import Rows
 
 
-class ChunkSums:
-    """Sums of one chunk of points, over the photographs and pairs that it touches and no others.
+class SharedRows:
+    """Rows that chunks add to at the same time: where an earlier chunk adds as well, a chunk has a row of its own.
+
+    Such rows stand behind the others and are added to them when all chunks are done, in order, so that no sum depends
+    on which chunk was the first.
 
     Parameters
     ----------
+    count : how many rows there are. touched : of every chunk, the rows that it adds to, each any number of times.
+    """
+
+    def __init__(self, count: int, touched: Sequence[Sequence[np.ndarray]]):
+        self.places: list[np.ndarray] = []
+        self._count = self._end = count
+        self._behind: list[tuple[np.ndarray, slice]] = []
+        seen = np.zeros(count, dtype=bool)
+        for rows in touched:
+            own = np.zeros(count, dtype=bool)
+            for part in rows:
+                own[part] = True
+            twice = np.flatnonzero(own & seen)
+            seen |= own
+            behind = slice(self._end, self._end + len(twice))
+            place = np.arange(count, dtype=np.int32)
+            place[twice] = np.arange(behind.start, behind.stop)
+            self.places.append(place)
+            self._behind.append((twice, behind))
+            self._end = behind.stop
+
+    def zeros(self, *shape: int) -> np.ndarray:
+        """Rows of a shape, and those behind them."""
+        return np.zeros((self._end, *shape))
+
+    def added_up(self, rows: np.ndarray) -> np.ndarray:
+        """The rows with those behind added to them: a view of `rows`, which is changed."""
+        for twice, behind in self._behind:
+            rows[twice] += rows[behind]
+        return rows[: self._count]
+
+
+class ChunkSums:
+    """Where the chunks of a system add up.
+
+    Parameters
+    ----------
+    bounds : the chunks, first and end of the points of each.
     n_shared : how many of the shared parameters, from the first, act on rays.
     """
 
-    def __init__(self, unknowns: Unknowns, first: int, last: int, n_shared: int):
-        image = unknowns.rays.image[unknowns.rays.start[first] : unknowns.rays.start[last]]
-        pair = unknowns.pair_block[unknowns.pair_start[first] : unknowns.pair_start[last]]
-        self._shared = slice(0, n_shared)
-        self._images = slice(int(image.min()), int(image.max()) + 1)
-        n = len(unknowns.images)
-        self._pairs = slice(int(pair.min()), int(pair.max()) + 1) if len(pair) else slice(n, n)
-        n_images, n_pairs = self._images.stop - self._images.start, self._pairs.stop - self._pairs.start
-        self.offsets = (self._images.start, self._pairs.start)
-        self._sums = Sums(
-            np.empty((n_images, 6, 6)),
-            np.empty((n_pairs, 6, 6)),
-            np.empty((n_images, n_shared, 6)),
-            np.empty((n_shared, n_shared)),
-            np.empty((n_images, 6)),
-            np.empty(n_shared),
-            np.empty((n_images, 6)),
-            np.empty(n_shared),
-        )
+    def __init__(self, unknowns: Unknowns, bounds: Sequence[tuple[int, int]], n_shared: int):
+        start, pair_start = unknowns.rays.start, unknowns.pair_start
+        images = [unknowns.rays.image[start[first] : start[last]] for first, last in bounds]
+        pairs = [unknowns.pair_block[pair_start[first] : pair_start[last]] for first, last in bounds]
+        self._images = SharedRows(len(unknowns.images), [(image,) for image in images])
+        self._blocks = SharedRows(len(unknowns.block_row), list(zip(images, pairs, strict=True)))
+        self._chunks, self._shared, self._of_rays = len(bounds), len(unknowns.shared), n_shared
+        self.places = [
+            Places(image, block) for image, block in zip(self._images.places, self._blocks.places, strict=True)
+        ]
 
-    def cleared(self) -> Sums:
-        """The arrays, set to zero."""
-        for array in self._sums:
-            array.fill(0.0)
-        return self._sums
+    def zeros(self) -> list[Sums]:
+        """Sums of every chunk, all zero. What is of photographs stands in arrays that all chunks have in common."""
+        s = self._of_rays
+        blocks, border = self._blocks.zeros(6, 6), self._images.zeros(self._shared, 6)
+        right, squares = self._images.zeros(6), self._images.zeros(6)
+        return [
+            Sums(blocks, border, np.zeros((s, s)), right, np.zeros(s), squares, np.zeros(s))
+            for _ in range(self._chunks)
+        ]
 
-    def cleared_right(self) -> tuple[np.ndarray, np.ndarray]:
-        """The arrays of the right side, set to zero."""
-        right = self._sums.right, self._sums.right_shared
-        for array in right:
-            array.fill(0.0)
-        return right
+    def matrix(self, sums: list[Sums]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Blocks (nb, 6, 6), border (n, s, 6) and corner (s, s) of all chunks, which are used up."""
+        corner, of_rays = np.zeros((self._shared, self._shared)), slice(self._of_rays)
+        for of_chunk in sums:
+            corner[of_rays, of_rays] += of_chunk.corner
+        return self._blocks.added_up(sums[0].blocks), self._images.added_up(sums[0].border), corner
 
-    def add_matrix_to(self, blocks: np.ndarray, border: np.ndarray, corner: np.ndarray) -> None:
-        """Add to the matrix of all chunks."""
-        blocks[self._images] += self._sums.diagonal
-        blocks[self._pairs] += self._sums.pairs
-        border[self._images, self._shared] += self._sums.border
-        corner[self._shared, self._shared] += self._sums.corner
+    def squares(self, sums: list[Sums]) -> tuple[np.ndarray, np.ndarray]:
+        """Squares of the columns before the points are eliminated, (n, 6) and (s,), of all chunks."""
+        return self._images.added_up(sums[0].squares), self._of_shared([part.squares_shared for part in sums])
 
-    def add_squares_to(self, squares: np.ndarray, squares_shared: np.ndarray) -> None:
-        """Add to the squares of the columns, before points are eliminated, of all chunks."""
-        squares[self._images] += self._sums.squares
-        squares_shared[self._shared] += self._sums.squares_shared
+    def right(self, sums: list[Sums]) -> tuple[np.ndarray, np.ndarray]:
+        """The right side (n, 6) and (s,) of all chunks."""
+        return self.right_of(sums[0].right, [part.right_shared for part in sums])
 
-    def add_right_to(self, right: np.ndarray, right_shared: np.ndarray) -> None:
-        """Add to the right side of all chunks."""
-        right[self._images] += self._sums.right
-        right_shared[self._shared] += self._sums.right_shared
+    def zero_right(self) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Room for the right side alone: of photographs, in common, and of shared parameters, of every chunk."""
+        return self._images.zeros(6), [np.zeros(self._of_rays) for _ in range(self._chunks)]
+
+    def right_of(self, right: np.ndarray, of_chunks: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """The right side (n, 6) and (s,) from such room."""
+        return self._images.added_up(right), self._of_shared(of_chunks)
+
+    def _of_shared(self, of_chunks: list[np.ndarray]) -> np.ndarray:
+        total = np.zeros(self._shared)
+        for part in of_chunks:
+            total[: self._of_rays] += part
+        return total
 
 
 def add_squares(rows: Rows, blocks: np.ndarray, border: np.ndarray, corner: np.ndarray) -> None:

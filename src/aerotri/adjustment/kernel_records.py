@@ -39,13 +39,31 @@ class RayArrays(NamedTuple):
 
 @record
 class Pairs(NamedTuple):
-    """The blocks of pairs of photographs: `start` (P + 1,) first pair of every point, `block` its number.
+    """The blocks of pairs of photographs: `start` (P + 1,) first pair of every point, `block` its number, 32 bits.
 
     Of two rays of a point the photograph of the first has the smaller number.
     """
 
     start: np.ndarray
     block: np.ndarray
+
+
+@record
+class PairedRays(NamedTuple):
+    """Rays to be paired: `start` and `image` of `RayArrays`, and where each stands.
+
+    Parameters
+    ----------
+    point : (m,) of every ray. pair_start : (P + 1,) first pair of rays of every point.
+    by_image : (m,) the rays in order of their photographs. first_ray : (n + 1,) first of every photograph there.
+    """
+
+    start: np.ndarray
+    image: np.ndarray
+    point: np.ndarray
+    pair_start: np.ndarray
+    by_image: np.ndarray
+    first_ray: np.ndarray
 
 
 @record
@@ -179,18 +197,25 @@ class Work(NamedTuple):
 
 
 @record
+class Places(NamedTuple):
+    """Where a range of points adds up: the row of `Sums` of every photograph `image` (n,) and block `block` (nb,)."""
+
+    image: np.ndarray
+    block: np.ndarray
+
+
+@record
 class Sums(NamedTuple):
-    """Normal equations of a range of points, over the ni photographs and no pairs of them that it touches.
+    """Normal equations of a range of points; rows of photographs and blocks as `Places` says.
 
     Parameters
     ----------
-    diagonal : (ni, 6, 6). pairs : (no, 6, 6). border : (ni, s, 6). corner : (s, s), of which each element is added on
-        one side of the diagonal, whichever. right : (ni, 6). right_shared : (s,).
-    squares, squares_shared : (ni, 6) and (s,) of the columns, before the points are eliminated.
+    blocks : (·, 6, 6), those of the photographs themselves first. border : (·, s, 6). corner : (s, s), of which each
+        element is added on one side of the diagonal, whichever. right : (·, 6). right_shared : (s,).
+    squares, squares_shared : (·, 6) and (s,) of the columns, before the points are eliminated.
     """
 
-    diagonal: np.ndarray
-    pairs: np.ndarray
+    blocks: np.ndarray
     border: np.ndarray
     corner: np.ndarray
     right: np.ndarray

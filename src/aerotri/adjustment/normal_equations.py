@@ -106,7 +106,7 @@ class NormalSystem:
         # mountings and errors of positions act on no ray; behind the others they need no sums
         apart = position_errors.KIND, rigging.KIND
         of_rays = 1 + max((k for k, kind in enumerate(unknowns.shared.kinds) if kind not in apart), default=-1)
-        self._sums = [ChunkSums(unknowns, first, last, of_rays) for first, last in self._bounds]
+        self._sums = ChunkSums(unknowns, self._bounds, of_rays)
         self.priors = SharedPriors.of(unknowns)
         # the kernels see no prior of a point that is not eliminated: it stands with the shared parameters
         self._point_prior = np.where((unknowns.kept < 0)[:, None], unknowns.prior_weight, 0.0)
@@ -156,18 +156,13 @@ class NormalSystem:
     def assemble(self, state: State, damping: float, estimator: Estimator) -> NormalEquations:
         """Normal equations at `state`; `damping` λ multiplies every diagonal element by 1 + λ."""
         u, problem = self.unknowns, self.problem(state, estimator, damping)
-
-        def chunk(k: int):
-            sums = self._sums[k]
-            return _kernels.assemble(*self._bounds[k], problem, sums.offsets, sums.cleared(), self.work())
-
-        outcomes = self.over_chunks(chunk)
-        n, s = len(u.images), len(u.shared)
-        blocks, border, corner = np.zeros((len(u.block_row), 6, 6)), np.zeros((n, s, 6)), np.zeros((s, s))
-        squares, squares_shared = np.zeros((n, 6)), np.array(self.priors.weight)
-        for sums in self._sums:
-            sums.add_matrix_to(blocks, border, corner)
-            sums.add_squares_to(squares, squares_shared)
+        sums, places = self._sums.zeros(), self._sums.places
+        outcomes = self.over_chunks(
+            lambda k: _kernels.assemble(*self._bounds[k], problem, places[k], sums[k], self.work())
+        )
+        blocks, border, corner = self._sums.matrix(sums)
+        squares, squares_shared = self._sums.squares(sums)
+        squares_shared += self.priors.weight
         corner = corner + corner.T - np.diag(np.diagonal(corner))
         rows = self.whitened_rows(state)
         for observed in rows:
@@ -186,24 +181,22 @@ class NormalSystem:
         chain = u.chain(state)
         if chain is not None and u.rigging is not None:
             u.rigging.add_squares(chain, squares, squares_shared)
-        side = self._summed(state, rows, ties, chain, outcomes, problem)
+        side = self._summed(state, rows, ties, chain, outcomes, problem, self._sums.right(sums))
         whole = np.concatenate([squares.ravel(), squares_shared]) * (1.0 + damping)
         matrix = BorderedMatrix(blocks, border, corner)
         return NormalEquations(**side.__dict__, matrix=matrix, diagonal=whole, chain=chain)
 
     def right_side(self, state: State, estimator: Estimator) -> RightSide:
         """The right side of the undamped equations at `state` and the cost there: a third of the work of `assemble`."""
-        problem = self.problem(state, estimator)
-
-        def chunk(k: int):
-            sums = self._sums[k]
-            return _kernels.reduce_right_side(
-                *self._bounds[k], problem, sums.offsets[0], *sums.cleared_right(), self.work()
+        problem, places = self.problem(state, estimator), self._sums.places
+        right, of_chunks = self._sums.zero_right()
+        outcomes = self.over_chunks(
+            lambda k: _kernels.reduce_right_side(
+                *self._bounds[k], problem, places[k].image, right, of_chunks[k], self.work()
             )
-
-        outcomes = self.over_chunks(chunk)
+        )
         rows, ties, chain = self.whitened_rows(state), self.tie_rows(state), self.unknowns.chain(state)
-        return self._summed(state, rows, ties, chain, outcomes, problem)
+        return self._summed(state, rows, ties, chain, outcomes, problem, self._sums.right_of(right, of_chunks))
 
     def _summed(
         self,
@@ -213,11 +206,10 @@ class NormalSystem:
         chain: Chain | None,
         outcomes: list[tuple[float, float, int]],
         problem: Problem,
+        of_points: tuple[np.ndarray, np.ndarray],
     ) -> RightSide:
-        """Chunks, observations beside the image points and observed shared parameters together."""
-        right, right_shared = np.zeros((len(self.unknowns.images), 6)), np.zeros(len(self.unknowns.shared))
-        for sums in self._sums:
-            sums.add_right_to(right, right_shared)
+        """Points, observations beside the image points and observed shared parameters together."""
+        right, right_shared = of_points
         for observed in rows:
             add_gaps(observed, right, right_shared)
         cost = sum(o[0] for o in outcomes) + sum(float(np.sum(observed.gap**2)) for observed in rows)

@@ -12,7 +12,7 @@ import numpy as np
 
 from aerotri.adjustment.kernel_records import RayArrays, Scans
 from aerotri.adjustment.photograph_fields import add_photograph_fields
-from aerotri.adjustment.photograph_pairs import photograph_pairs
+from aerotri.adjustment.photograph_pairs import ordered, photograph_pairs
 from aerotri.adjustment.rig_ties import Ties
 from aerotri.adjustment.rigging import Chain, Mountings, OnRigs, Rigging, photographs_on_rigs, with_leads
 from aerotri.adjustment.scanning import NONE, Scanning, scanning_of
@@ -350,17 +350,11 @@ def _sort_rays(block: Block, active: np.ndarray, centre: np.ndarray):
     points = points[np.argsort(first_image[points], kind="stable")]
     rank = np.empty(len(block.points), dtype=np.int64)
     rank[points] = np.arange(len(points))
-    order = _order_of(rank[ray_point] * len(images) + ray_image)
     row_start = np.concatenate([[0], np.cumsum(counts[points])]).astype(np.int64)
+    first_of_image = np.concatenate([[0], np.cumsum(np.bincount(ray_image, minlength=len(images)))[:-1]])
+    by_image = ordered(ray_image, first_of_image, np.arange(len(rows)))
+    order = ordered(rank[ray_point], row_start[:-1], by_image)
     return rows[order], images, points, ray_image[order], row_start
-
-
-def _order_of(key: np.ndarray) -> np.ndarray:
-    """Where the numbers, none of them negative, stand in order: 16 bits at a time, which NumPy sorts in one pass."""
-    order = np.argsort((key & 0xFFFF).astype(np.uint16), kind="stable")
-    for shift in range(16, int(key.max(initial=0)).bit_length(), 16):
-        order = order[np.argsort((key[order] >> shift & 0xFFFF).astype(np.uint16), kind="stable")]
-    return order
 
 
 def _ties(on_rigs: OnRigs, block: np.ndarray) -> Ties:
@@ -374,12 +368,10 @@ def _pattern(n: int, row_start: np.ndarray, ray_image: np.ndarray, tied: np.ndar
 
     Pairs that are tied (t, 2) have a block of their own; its place comes last.
     """
-    counts = np.diff(row_start)
-    pair_start = np.concatenate([[0], np.cumsum(counts * (counts - 1) // 2)]).astype(np.int64)
-    pairs = photograph_pairs(row_start, ray_image, n, tied)
+    pairs = photograph_pairs(row_start, ray_image, n, tied, first_number=n)
     block_row = np.concatenate([np.arange(n), pairs.first])
     block_col = np.concatenate([np.arange(n), pairs.second])
-    return pair_start, pairs.of_rays + n, block_row, block_col, pairs.of_ties + n
+    return pairs.start, pairs.of_rays, block_row, block_col, pairs.of_ties
 
 
 def _control_priors(block: Block, points: np.ndarray, origin: np.ndarray):
