@@ -114,13 +114,13 @@ def test_what_parameters_describe_moves_nothing():
     """A field that is b1 and b2 of the lens, which were estimated: what it does to rays and to unknowns cancels."""
     found = adjust_keeping_system(simulated(1, "brown:b1+b2")[0])
     system, block = found.system, found.local.block
-    counts, half = node_counts(system), half_format(system)
+    counts, half = node_counts(block.cameras), half_format(block.cameras)
     x, _ = np.meshgrid(*(h * np.linspace(-1.0, 1.0, k) for h, k in zip(half, counts, strict=True)), indexing="ij")
     root = 1e-3 * x.ravel()[:, None]
     field = Field(1.0, 1.0, True, 0.0, 1.0, 1, root)
     factor = system.factorise(found.solution.equations)
     one = Clusters("camera", np.zeros(len(system.unknowns.images), np.int64), ("",), 1)
-    made = root_of_field(system, found.solution, factor, one, field)
+    made, _ = root_of_field(system, found.solution, factor, one, field)
     by = np.concatenate([made.images.reshape(-1, made.images.shape[2]), made.shared])
     # of the two components the error along x alone is b1
     by = by[:, :1] @ np.array([[1.0, 0.0]])

@@ -115,7 +115,7 @@ def camera_field(found: Adjustment) -> CameraField | None:
     gain, variance, noise, length = _most_likely(found, equations, squares)
     if np.exp(-0.5 * gain) >= LEVEL:
         return None
-    power, patterns = np.linalg.eigh(variance * correlations(system, length, True))
+    power, patterns = np.linalg.eigh(variance * correlations(u.block.cameras, length, True))
     kept = power > KEPT * power[-1]
     root = patterns[:, kept] * np.sqrt(power[kept])
     sides = equations.sides.reshape(len(equations.sides), -1, len(root)) @ root
@@ -131,7 +131,7 @@ def camera_field(found: Adjustment) -> CameraField | None:
         float(np.sqrt(noise)),
         root,
         half,
-        node_counts(system),
+        node_counts(u.block.cameras),
         part,
         by_unknowns,
     )
@@ -144,17 +144,18 @@ def _most_likely(found: Adjustment, equations: FieldEquations, squares: float) -
     ----------
     squares : vᵀPv.
     """
-    system, redundancy = found.system, found.local.outcome.redundancy
+    u, redundancy = found.system.unknowns, found.local.outcome.redundancy
+    cameras = u.block.cameras
     values, vectors = np.linalg.eigh(equations.normals)
     there = values > SEEN * values[-1]
     root = vectors[:, there] * np.sqrt(values[there])
     z = (vectors[:, there].T @ equations.scores) / np.sqrt(values[there])
     spread = root.reshape(2 * len(equations.camera), equations.nodes.count, -1)
-    unit, half = float(np.median(1.0 / system.unknowns.rays.inv_sigma)), float(np.hypot(*half_format(system)))
+    unit, half = float(np.median(1.0 / u.rays.inv_sigma)), float(np.hypot(*half_format(cameras)))
     sizes = (unit * SIZES) ** 2
     best = (0.0, 0.0, squares / redundancy, half)
     for length in half * np.array(LENGTHS):
-        r = correlations(system, length, True)
+        r = correlations(u.block.cameras, length, True)
         power, patterns = np.linalg.eigh(np.einsum("cip,ij,cjq->pq", spread, r, spread, optimize=True))
         grown = sizes[:, None] * np.maximum(power, 0.0)
         explained = np.sum((patterns.T @ z) ** 2 * grown / (1.0 + grown), axis=1)
