@@ -58,7 +58,7 @@ def test_errors_that_do_not_average_out_count_in_the_bias(tmp_path, control):
 
     sigma, length = 0.05, 12.0 * CELL
     x, y = np.meshgrid(control.grid.x(np.arange(120)), control.grid.y(np.arange(100)))
-    some = np.random.default_rng(4).integers(0, 120 * 100, 400)
+    some = np.random.default_rng(4).choice(120 * 100, 400, replace=False)
     place = np.column_stack([x.ravel(), y.ravel()])
     apart = np.linalg.norm(place[:, None] - place[some], axis=2)
     known = np.exp(-apart[some] / length)

@@ -114,7 +114,7 @@ def test_what_parameters_describe_moves_nothing():
     """A field that is b1 and b2 of the lens, which were estimated: what it does to rays and to unknowns cancels."""
     found = adjust_keeping_system(simulated(1, "brown:b1+b2")[0])
     system, block = found.system, found.local.block
-    counts, half = node_counts(system.unknowns.block.cameras), half_format(system.unknowns.block.cameras)
+    counts, half = node_counts(block.cameras), half_format(block.cameras)
     x, _ = np.meshgrid(*(h * np.linspace(-1.0, 1.0, k) for h, k in zip(half, counts, strict=True)), indexing="ij")
     root = 1e-3 * x.ravel()[:, None]
     field = Field(1.0, 1.0, True, 0.0, 1.0, 1, root)

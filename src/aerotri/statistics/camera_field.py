@@ -30,7 +30,6 @@ from aerotri.statistics.cluster_fields import (
     half_format,
     node_counts,
     nodes_at,
-    of_patterns,
 )
 from aerotri.statistics.cluster_test import LEVEL
 from aerotri.statistics.clusters import CAMERA, LARGE, Clusters
@@ -85,7 +84,7 @@ class CameraField:
         out = np.zeros((len(gain), gain.shape[1], self.by_unknowns.shape[1] // (2 * k), 2, k))
         ray = np.arange(len(gain))
         out[ray, :, self.part[camera]] = gain[:, :, :, None] * self.at(xy, camera)[:, None, None, :]
-        return out.reshape(len(gain), gain.shape[1], -1)
+        return out.reshape(len(gain), gain.shape[1], self.by_unknowns.shape[1])
 
 
 def known_field(found: Adjustment) -> CameraField | None:
@@ -106,9 +105,9 @@ def camera_field(found: Adjustment) -> CameraField | None:
     system, solution, outcome = found.system, found.solution, found.local.outcome
     u = system.unknowns
     rows = u.block.images.camera[u.images]
-    there = np.unique(rows)
+    cameras = np.unique(rows)
     squares = outcome.sigma0**2 * outcome.redundancy
-    if len(there) > MOST_CAMERAS or len(u.images) > LARGE or not squares > 0.0:
+    if len(cameras) > MOST_CAMERAS or len(u.images) > LARGE or not squares > 0.0:
         return None
     factor = system.factorise(solution.equations)
     one = Clusters(CAMERA, np.zeros(len(u.images), np.int64), ("",), 1)
@@ -119,9 +118,10 @@ def camera_field(found: Adjustment) -> CameraField | None:
     power, patterns = np.linalg.eigh(variance * correlations(u.block.cameras, length, True))
     kept = power > KEPT * power[-1]
     root = patterns[:, kept] * np.sqrt(power[kept])
+    sides = equations.sides.reshape(len(equations.sides), -1, len(root)) @ root
     part = np.full(len(u.block.cameras), -1)
     part[equations.camera] = np.arange(len(equations.camera))
-    by_unknowns = factor.solve(of_patterns(equations.sides, root))
+    by_unknowns = factor.solve(np.ascontiguousarray(sides.reshape(len(sides), -1)))
     by_unknowns[: 6 * len(u.images)] *= u.eo_free.reshape(-1, 1)
     half = np.array([camera.half_format_mm for camera in u.block.cameras])
     return CameraField(
@@ -144,14 +144,14 @@ def _most_likely(found: Adjustment, equations: FieldEquations, squares: float) -
     ----------
     squares : vᵀPv.
     """
-    system, redundancy = found.system, found.local.outcome.redundancy
-    cameras = system.unknowns.block.cameras
+    u, redundancy = found.system.unknowns, found.local.outcome.redundancy
+    cameras = u.block.cameras
     values, vectors = np.linalg.eigh(equations.normals)
     there = values > SEEN * values[-1]
     root = vectors[:, there] * np.sqrt(values[there])
     z = (vectors[:, there].T @ equations.scores) / np.sqrt(values[there])
     spread = root.reshape(2 * len(equations.camera), equations.nodes.count, -1)
-    unit, half = float(np.median(1.0 / system.unknowns.rays.inv_sigma)), float(np.hypot(*half_format(cameras)))
+    unit, half = float(np.median(1.0 / u.rays.inv_sigma)), float(np.hypot(*half_format(cameras)))
     sizes = (unit * SIZES) ** 2
     best = (0.0, 0.0, squares / redundancy, half)
     for length in half * np.array(LENGTHS):
