@@ -6,8 +6,26 @@ from functools import partial
 from pathlib import Path
 
 from aerotri.partition.joint_tasks import follow, invert, join
+from aerotri.partition.model_endings import (
+    group_part,
+    held_part,
+    hold_part,
+    pattern_part,
+    patterned_part,
+    pull_part,
+    turn_part,
+)
+from aerotri.partition.model_tasks import (
+    compare_part,
+    describe_part,
+    field_part,
+    probe_part,
+    probed_part,
+    score_part,
+)
 from aerotri.partition.part_results import measure_part, write_part
 from aerotri.partition.part_tasks import evaluate_part, move_part, prepare_part, reduce_part
+from aerotri.partition.side_tasks import follow_sides, join_sides
 
 MARKS = "AEROTRI_TEST_KILLED"
 """Names the folder in which a task that kills its process leaves its name, for all processes."""
@@ -27,7 +45,16 @@ def killed_once(function, shared, task):
 
 
 OF_PARTS = (prepare_part, reduce_part, move_part, evaluate_part, measure_part, write_part)
-KILLED = {function.__name__: partial(killed_once, function) for function in (*OF_PARTS, join, follow, invert)}
+
+
+def _killed(*functions):
+    return {function.__name__: partial(killed_once, function) for function in functions}
+
+
+KILLED = _killed(*OF_PARTS, join, follow, invert)
+OF_TESTS = _killed(describe_part, probe_part, probed_part, score_part, compare_part, join_sides, follow_sides)
+OF_GROUPS = _killed(hold_part, held_part, pull_part, turn_part, group_part)
+OF_FIELDS = _killed(field_part, pattern_part, patterned_part)
 
 
 def never(move, task):

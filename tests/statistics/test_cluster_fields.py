@@ -8,7 +8,7 @@ import pytest
 from aerotri.diagnosis.moving_errors import model_part_in_words
 from aerotri.pipeline.chain import adjust_keeping_system
 from aerotri.results.model_part import FIELD, GROUPS
-from aerotri.statistics.cluster_fields import compare_field, field_equations, root_of_field
+from aerotri.statistics.cluster_fields import field_equations, fitted_field, root_of_field
 from aerotri.statistics.cluster_test import untestable
 from aerotri.statistics.clusters import Clusters
 from dense_algebra import dense_design
@@ -55,9 +55,9 @@ def test_equations_of_the_nodes_are_those_of_dense_algebra(small):
 def test_columns_of_the_unknowns_are_those_of_dense_algebra(small):
     """F = Q·AᵀPB·R of photographs, shared parameters and points."""
     found, clusters, equations, design, basis, _ = small
-    _, field = compare_field(found.system, found.solution, _factor(found), clusters, 1.0, 0.0)
+    field = fitted_field(found.system, found.solution, _factor(found), 1.0, clusters)
     root = np.random.default_rng(1).normal(size=(equations.nodes.count, 2))
-    made = root_of_field(found.system, found.solution, _factor(found), clusters, replace(field, root=root))
+    made, squares = root_of_field(found.system, found.solution, _factor(found), clusters, replace(field, root=root))
     scale = 1.0 / np.linalg.norm(design, axis=0)
     right = (design * scale).T @ basis @ np.kron(np.eye(6), root)
     expected = np.linalg.solve((design * scale).T @ (design * scale), right) * scale[:, None]
@@ -69,6 +69,8 @@ def test_columns_of_the_unknowns_are_those_of_dense_algebra(small):
         (made.points.reshape(-1, 12), expected[n + s :]),
     ):
         assert part == pytest.approx(of_dense, abs=1e-5 * np.abs(of_dense).max())
+    own = expected[n + s :].reshape(-1, 3, 12)
+    assert squares == pytest.approx(own @ np.swapaxes(own, 1, 2), abs=1e-5 * np.max(own**2))
 
 
 def test_white_noise_is_no_field():

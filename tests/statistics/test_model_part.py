@@ -1,6 +1,7 @@
 """The model part of σ: against dense algebra, and on simulated blocks with and without errors of strips."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from aerotri.statistics.cluster_influence import influences, known_part
 from aerotri.statistics.cluster_test import compare_clusters, sum_of_squares, weakest_modes
 from aerotri.statistics.clusters import CAMERA, PHOTOGRAPH, Clusters, cluster_schemes, to_test
 from aerotri.statistics.covariance import cofactors
-from aerotri.statistics.model_part import compare_schemes, excess_of_clusters, positive_part
+from aerotri.statistics.model_part import compare_schemes, excess_of_clusters, positive_part, squares_by
 from dense_algebra import dense_design
 from rig_blocks import rig_block
 from small_blocks import small_block, with_adjustment
@@ -42,7 +43,7 @@ def small():
         image = np.concatenate([image, np.repeat(rows_beside.image[:, None], there.shape[1], axis=1)[there]])
     assert len(gap) == len(design)
     assert len(observed)
-    clusters = cluster_schemes(u, solution.state)[0]
+    clusters = cluster_schemes(u.block, u.images, solution.state.centre)[0]
     label = np.where(image >= 0, clusters.label[np.maximum(image, 0)], -1)
     return found, design, gap, label, clusters
 
@@ -151,14 +152,22 @@ def test_positive_part():
     rng = np.random.default_rng(1)
     root = rng.normal(size=(4, 3, 3))
     whole = root @ np.swapaxes(root, 1, 2)
-    assert positive_part(whole) == pytest.approx(whole)
-    assert np.linalg.eigvalsh(positive_part(whole - 2.0 * np.eye(3))).min() > -1e-12
+    nothing = np.zeros_like(whole)
+    assert positive_part(whole, nothing) == pytest.approx(whole)
+    assert np.linalg.eigvalsh(positive_part(whole, nothing + 2.0 * np.eye(3))).min() > -1e-12
+    for left in (1e-3, 1e-6, -1e-6):
+        # noise explains nearly all of one variance: the others do not grow with it
+        noise = np.diag([0.1, 0.1, whole[0, 2, 2] - left])[None]
+        found = positive_part(whole[:1], noise)[0]
+        assert (np.diagonal(found) < 2.0 * np.diagonal(whole[0])).all()
 
 
 def _tested(block):
     found = adjust_keeping_system(block)
-    factor = found.system.factorise(found.solution.equations)
-    return found, *compare_schemes(found.system, found.solution, factor, found.local.outcome.sigma0)
+    system, solution, centre = found.system, found.solution, found.solution.state.centre
+    schemes = cluster_schemes(system.unknowns.block, system.unknowns.images, centre)
+    squares = partial(squares_by, system, solution, _factor(found))
+    return found, schemes, compare_schemes(schemes, centre, found.local.outcome.sigma0, squares)
 
 
 def test_white_noise_is_no_error_of_strips():
@@ -210,7 +219,8 @@ def test_columns_of_single_exposures_make_no_groups():
     number = np.arange(len(block.images))
     columns = {"time": number.astype(str), "station": (number // 2).astype(str), "day": (number % 2).astype(str)}
     found = adjust_keeping_system(replace(block, images=replace(block.images, columns=columns)))
-    schemes = {one.scheme for one in cluster_schemes(found.system.unknowns, found.solution.state)}
+    u = found.system.unknowns
+    schemes = {one.scheme for one in cluster_schemes(u.block, u.images, found.solution.state.centre)}
     assert "day" in schemes
     assert not schemes & {"time", "station"}
 
@@ -218,10 +228,10 @@ def test_columns_of_single_exposures_make_no_groups():
 def test_random_divisions_have_no_excess():
     found, schemes, _ = _tested(drone_block(4)[0])
     system, solution = found.system, found.solution
-    modes = weakest_modes(system, solution, _factor(found))
     label = np.random.default_rng(2).permutation(schemes[0].label)
     clusters = Clusters("another", label, schemes[0].names, 8)
-    test = compare_clusters(system, solution, _factor(found), modes, clusters, found.local.outcome.sigma0, 0.001)
+    squares = squares_by(system, solution, _factor(found))
+    test = compare_clusters(squares, clusters, solution.state.centre, found.local.outcome.sigma0, 0.001)
     assert not test.counts
     assert 0.7 < test.ratio < 1.4
 
@@ -255,7 +265,7 @@ def test_heads_of_a_rig_fly_the_strips_of_the_rig(named):
     found = adjust_keeping_system(block)
     u = found.system.unknowns
     station = np.asarray(block.images.columns["station"], dtype=object)[u.images]
-    schemes = {one.scheme: one for one in cluster_schemes(u, found.solution.state)}
+    schemes = {one.scheme: one for one in cluster_schemes(u.block, u.images, found.solution.state.centre)}
     assert len(schemes["strip"]) == 3
     for scheme in ("strip", "direction of flight"):
         if scheme in schemes:

@@ -14,14 +14,14 @@ import argparse
 import re
 import tempfile
 import time
-from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 import aerotri
 from aerotri import geometry
+from runs_elsewhere import BYTES_OF_RUN, Runs, add_executor, runs_of
 
 PARAMETERS, ROBUST = "brown:K1+K2+K3+P1+P2", "huber"
 FOCAL_MM = {"S": 28.0, "A": 43.0, "D": 43.0, "W": 43.0, "X": 43.0}
@@ -101,15 +101,31 @@ def oriented(block: aerotri.Block) -> aerotri.Block:
     return replace(block, images=replace(block.images, centre=centre, angles=angles))
 
 
-def left_out_in_turn(block: aerotri.Block, full: aerotri.Adjustment) -> Iterator[tuple[str, aerotri.Adjustment | str]]:
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """A control point that was left out: difference, its σ, and difference over σ, (3,) each."""
+
+    difference: np.ndarray
+    sigma: np.ndarray
+    w: np.ndarray
+
+
+def left_out_in_turn(block: aerotri.Block, full: aerotri.Adjustment, runs: Runs) -> list[tuple[str, LeftOut | str]]:
     """Every control point as a check point, from the orientation of the full adjustment; why where there is none."""
     start = full.adjusted
     oriented = replace(block, images=replace(block.images, centre=start.images.centre, angles=start.images.angles))
-    for name in block.points[block.control.point].astype(str).tolist():
-        try:
-            yield name, aerotri.adjust(aerotri.edit(oriented, check=[name]), points=start.points.xyz)
-        except aerotri.AdjustmentFailedError as failure:
-            yield name, failure.outcome.message
+    names = block.points[block.control.point].astype(str).tolist()
+    found = runs(_left_out, (oriented, start.points.xyz), names, BYTES_OF_RUN + 3000 * len(block.image_points))
+    return list(zip(names, found, strict=True))
+
+
+def _left_out(start: tuple[aerotri.Block, np.ndarray], name: str) -> LeftOut | str:
+    block, points = start
+    try:
+        check = aerotri.adjust(aerotri.edit(block, check=[name]), points=points).adjusted.check
+    except aerotri.AdjustmentFailedError as failure:
+        return failure.outcome.message
+    return LeftOut(check.difference[0], check.sigma[0], check.w[0])
 
 
 def print_table(found: aerotri.Adjustment, seconds: float) -> None:
@@ -133,6 +149,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="folder of the data")
     parser.add_argument("--exposures", type=int, default=10**6, help="the first ones only")
     parser.add_argument("--leave-out", action="store_true", help="every control point in turn")
+    add_executor(parser)
     options = parser.parse_args()
     block = oriented(exposures(unoriented(options.folder), 0, options.exposures))
     started = time.perf_counter()
@@ -140,14 +157,17 @@ def main() -> None:
     print_table(result, time.perf_counter() - started)
     if options.leave_out:
         print("| left out | dX m | dY m | dZ m | d/σ X | d/σ Y | d/σ Z |\n|---|---|---|---|---|---|---|")
-        for name, found in left_out_in_turn(block, result):
-            if isinstance(found, str):
-                print(f"| {name} | {found} | | | | | |")
-                continue
-            d, s = found.adjusted.check.difference[0], found.adjusted.check.sigma[0]
-            cells = [f"{a:+.3f} ± {b:.3f}" for a, b in zip(d, s, strict=True)]
-            cells += [f"{a:+.1f}" for a in found.adjusted.check.w[0]]
-            print("| " + " | ".join([name, *cells]) + " |", flush=True)
+        with runs_of(options) as runs:
+            for name, found in left_out_in_turn(block, result, runs):
+                print(f"| {name} | {cells_of(found)}")
+
+
+def cells_of(left: LeftOut | str) -> str:
+    """The rest of a row of the table of points that were left out."""
+    if isinstance(left, str):
+        return f"{left} | | | | | |"
+    cells = [f"{a:+.3f} ± {b:.3f}" for a, b in zip(left.difference, left.sigma, strict=True)]
+    return " | ".join(cells + [f"{a:+.1f}" for a in left.w]) + " |"
 
 
 if __name__ == "__main__":

@@ -20,13 +20,18 @@ from aerotri.partition.tree import Joint, PartsTree, tree_over
 
 ACROSS, B, PARAMETERS = 1, 6, 44
 """Strips beside that a photograph has points in common with; unknowns of a photograph; shared parameters."""
+CLUSTERS, TURNS, DIRECTIONS, CONTROL, TESTS = 12, 38, 36, 48, 8
+"""Of the model part of σ: groups of a large block and turns until their solutions stand; columns of the weakest
+deformations and of control; tests, of which each has six columns a group and goes up only: strips, photographs, and
+three random divisions of two schemes."""
 MULTIPLICATIONS_A_SECOND = 10e9
 """Of one core, taken for the times; of the machine that the measured sizes were run on."""
 HEAD = (
     "photographs", "parts", "shared photographs of a part", "of all", "factor of a part GB",
     "largest front of a joint GB", "its task GB", "files of an iteration GB", "of them joints",
     "multiplications of the parts 10¹²", "of the joints 10¹²", "minutes of one core, parts", "joints",
-    "joints one above the other",
+    "joints one above the other", "numbers of all factors 10⁹", "multiplications of the model part 10¹²",
+    "GB read for it",
 )  # fmt: skip
 OF_LEVELS = (
     "joints above", "joints", "own photographs of the largest", "photographs that stay", "front GB", "files GB",
@@ -52,6 +57,7 @@ class JointCost:
         c, r = B * joint.own, B * len(joint.rows) + PARAMETERS
         self.front, self.files = c * c + r * c + r * r, c * c + r * c + r * r
         self.flops = c**3 / 3 + c * c * r + c * r * r
+        self.numbers, self.kept = c * c / 2 + c * r, c * c + c * r
         self.own, self.rows = joint.own, len(joint.rows)
 
 
@@ -107,12 +113,17 @@ def planned_block(photographs: int, of_a_part: int, along_reach: int) -> tuple[s
     largest, flops = max(joint.front for joint in joints), sum(joint.flops for joint in joints)
     in_a_row = sum(max(joints[k].flops for k in level) for level in tree.upwards())
     minute = 60.0 * MULTIPLICATIONS_A_SECOND
+    of_factors = own.entries * parts + sum(joint.numbers for joint in joints)
+    columns = DIRECTIONS + CONTROL + (TURNS + 2) * CLUSTERS + TESTS * 6 * CLUSTERS / 2
+    passes = 2 * (TURNS + 3) + TESTS
+    read = 8e-9 * passes * (own.entries * parts + sum(joint.kept for joint in joints))
     numbers = (
         f"{n}", f"{parts}", f"{np.mean([len(one) for one in shared]):.0f}", f"{len(kept)}",
         f"{8.0 * (own.entries + own.updates) / 1e9:.2f}", f"{8.0 * largest / 1e9:.2f}", f"{16.0 * largest / 1e9:.2f}",
         f"{(left + 8.0 * own.entries * parts + of_joints) / 1e9:.1f}", f"{of_joints / 1e9:.1f}",
         f"{own.flops * parts / 1e12:.2f}", f"{flops / 1e12:.2f}", f"{own.flops * parts / minute:.1f}",
-        f"{flops / minute:.1f}", f"{in_a_row / minute:.1f}",
+        f"{flops / minute:.1f}", f"{in_a_row / minute:.1f}", f"{of_factors / 1e9:.2f}",
+        f"{2.0 * columns * of_factors / 1e12:.2f}", f"{read:.0f}",
     )  # fmt: skip
     return "| " + " | ".join(numbers) + " |", tree
 

@@ -17,7 +17,8 @@ import numpy as np
 
 import aerotri
 from aerotri import geometry, observations
-from ca502 import MOUNTING_DEG, NADIR, exposures, left_out_in_turn, print_table, unoriented
+from ca502 import MOUNTING_DEG, NADIR, cells_of, exposures, left_out_in_turn, print_table, unoriented
+from runs_elsewhere import add_executor, runs_of
 
 POSITION_M = {"A": (0, -0.05, 0.02), "D": (0, 0.05, 0.02), "W": (-0.05, 0, 0.02), "X": (0.05, 0, 0.02)}
 """Nominal projection centres of the heads in the frame of the nadir head."""
@@ -171,6 +172,7 @@ def main() -> None:
     parser.add_argument("--leave-out", action="store_true", help="every control point in turn")
     parser.add_argument("--orientations", type=Path, help="file of start orientations; written where it is not there")
     parser.add_argument("--position-sigma", type=float, default=SIGMA_M, help="σ of the nominal positions, m")
+    add_executor(parser)
     options = parser.parse_args()
     block = exposures(unoriented(options.folder), 0, options.exposures)
     block = whole_stations(with_rig(block, sigma_m=options.position_sigma))
@@ -195,8 +197,9 @@ def main() -> None:
             print_movements(found[name])
         if options.leave_out:
             print("| left out | | dX m | dY m | dZ m | d/σ X | d/σ Y | d/σ Z |\n|---|---|---|---|---|---|---|---|")
-            for point, left in left_out_in_turn(own, found[name]):
-                print(f"| {point} | {name} | {_row(left)}", flush=True)
+            with runs_of(options) as runs:
+                for point, left in left_out_in_turn(own, found[name], runs):
+                    print(f"| {point} | {name} | {cells_of(left)}", flush=True)
     if {"rigid", "off"} <= found.keys():
         print("\n## Relative orientations\n")
         print_mountings(found["rigid"], found["off"], block)
@@ -206,14 +209,6 @@ def oriented_as(block: aerotri.Block, found: aerotri.Adjustment) -> aerotri.Bloc
     """The block with the orientations of an adjustment as start values."""
     images = found.adjusted.images
     return replace(block, images=replace(block.images, centre=images.centre, angles=images.angles))
-
-
-def _row(left: aerotri.Adjustment | str) -> str:
-    if isinstance(left, str):
-        return f"{left} | | | | | |"
-    check = left.adjusted.check
-    cells = [f"{a:+.3f} ± {b:.3f}" for a, b in zip(check.difference[0], check.sigma[0], strict=True)]
-    return " | ".join(cells + [f"{a:+.1f}" for a in check.w[0]]) + " |"
 
 
 if __name__ == "__main__":

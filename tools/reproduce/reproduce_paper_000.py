@@ -12,6 +12,7 @@ Example: python tools/reproduce/reproduce_paper_000.py --out results
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +27,10 @@ from aerotri.volume.functionals import tin_volume, triangulated
 from aerotri.volume.sections import cross_sections, section_volume
 from aerotri.volume.sensitivity import SECOND, Pair, explicit, explicit_partials, rigorous, rigorous_partials
 from aerotri.volume.settings import RULES
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "prove"))
+
+from runs_elsewhere import Runs, add_executor, runs_of
 
 # Table 1 of the paper
 PAIR = Pair(
@@ -143,11 +148,8 @@ def table_2() -> tuple[list[str], dict[str, list[float]]]:
     return lines, off
 
 
-def table_3() -> list[str]:
+def table_3(runs: Runs) -> list[str]:
     """Error of the volume by pixel size: pointing within half a pixel in both photographs, pickets every 10 m."""
-    points, triangles = lattice(10.0), triangulated(lattice(10.0))
-    exact = tin_volume(points, triangles, boundary())[0]
-    xy = PAIR.project(points)
     lines = [
         "## Table 3: pixel size", "",
         f"Pickets every 10 m, each pointed at to within half a pixel; {SEEDS} runs. RMS error of the volume, % of the "
@@ -158,17 +160,21 @@ def table_3() -> list[str]:
         "|---|---|---|---|---|---|",
     ]  # fmt: skip
     for pixel, paper in zip(PIXELS_UM, (3.86, 5.08, 8.54, 11.90), strict=True):
-        errors, height = [], []
-        for seed in range(SEEDS):
-            rng = np.random.default_rng([seed, int(pixel)])
-            noise = rng.uniform(-0.5e-3 * pixel, 0.5e-3 * pixel, xy.shape)
-            found = rigorous(PAIR, xy + noise, points).xyz
-            height.append(np.mean((found[:, 2] - points[:, 2]) ** 2))
-            errors.append(tin_volume(found, triangles, boundary())[0] - exact)
+        height, errors = zip(*runs(pointed_at, pixel, range(SEEDS)), strict=True)
         rms = float(np.sqrt(np.mean(np.square(errors))))
         lines.append(f"| {pixel:g} | {np.sqrt(np.mean(height)):.3f} | {rms:.0f} | {100 * rms / true_volume():.3f} | "
                      f"{100 * rms / hill_volume():.2f} | {paper:.2f} |")  # fmt: skip
     return [*lines, ""]
+
+
+def pointed_at(pixel: float, seed: int) -> tuple[float, float]:
+    """Mean square error of a height, m², and error of the volume, m³, with noise of pointing."""
+    points, triangles = lattice(10.0), triangulated(lattice(10.0))
+    xy, rng = PAIR.project(points), np.random.default_rng([seed, int(pixel)])
+    noise = rng.uniform(-0.5e-3 * pixel, 0.5e-3 * pixel, xy.shape)
+    found = rigorous(PAIR, xy + noise, points).xyz
+    exact = tin_volume(points, triangles, boundary())[0]
+    return float(np.mean((found[:, 2] - points[:, 2]) ** 2)), tin_volume(found, triangles, boundary())[0] - exact
 
 
 def table_4() -> tuple[list[str], dict[str, list[tuple[float, float]]]]:
@@ -330,10 +336,13 @@ def main() -> None:
     """Compute, print, write where asked."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--out", type=Path)
+    add_executor(parser)
     options = parser.parse_args()
     second, off = table_2()
     fourth, curves = table_4()
-    text = "\n".join(["# Paper 000: earthworks from a stereo pair, on a site of known volume", "", *second, *table_3(),
+    with runs_of(options) as runs:
+        third = table_3(runs)
+    text = "\n".join(["# Paper 000: earthworks from a stereo pair, on a site of known volume", "", *second, *third,
                       *fourth, *table_5(), *consistency()]) + "\n"  # fmt: skip
     print(text, end="")
     if options.out is not None:

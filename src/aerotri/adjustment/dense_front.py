@@ -105,20 +105,19 @@ class DenseFront:
 
 
 def half_solved(front: DenseFront, scale: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """L⁻¹ times the right side of an eliminated front (6·c + 6·r + s,), and what is left for rows and border."""
+    """L⁻¹ times the right sides of an eliminated front (6·c + 6·r + s, k), and what is left for rows and border."""
     own = len(scale)
     if not own:
-        return np.zeros(0), right.copy()
-    half = dtrsm(1.0, front.top, (right[:own] * scale)[:, None], lower=1)[:, 0]
+        return np.zeros((0, right.shape[1])), right.copy()
+    half = dtrsm(1.0, front.top, right[:own] * scale[:, None], lower=1)
     return half, right[own:] - front.low @ half
 
 
 def solved_back(front: DenseFront, scale: np.ndarray, half: np.ndarray, above: np.ndarray) -> np.ndarray:
-    """(6·c,) solution of the own photographs from that of rows and border, above (6·r + s,)."""
+    """(6·c, k) solutions of the own photographs from those of rows and border, above (6·r + s, k)."""
     if not len(scale):
-        return np.zeros(0)
-    side = half - front.low.T @ above
-    return dtrsm(1.0, front.top, side[:, None], lower=1, trans_a=1)[:, 0] * scale
+        return np.zeros((0, above.shape[1]))
+    return dtrsm(1.0, front.top, half - front.low.T @ above, lower=1, trans_a=1) * scale[:, None]
 
 
 def _flat(a: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from aerotri.adjustment import _kernels, _point_kernels, position_errors, rigging
+from aerotri.adjustment import _kernels, _point_kernels, _settling_kernels, position_errors, rigging
 from aerotri.adjustment.chunk_sums import ChunkSums, add_gaps, add_own_squares, add_squares
 from aerotri.adjustment.datum import ExtraObservations, free_motions, observes_centres, without_motion
 from aerotri.adjustment.kernel_records import (
@@ -329,7 +329,11 @@ class NormalSystem:
         """The state with every point moved, on its own and only downhill, to where its rays want it."""
         settled = replace(state, points=state.points.copy())
         problem = self.problem(settled, estimator)
-        self.over_chunks(lambda k: _kernels.settle_points(*self._bounds[k], problem, rounds, self.work()))
+        self.over_chunks(
+            lambda k: _settling_kernels.settle_points(
+                *self._bounds[k], problem, rounds, _settling_kernels.NEARLY, self.work()
+            )
+        )
         return settled
 
     def looseness(self, state: State, estimator: Estimator) -> np.ndarray:

@@ -79,30 +79,44 @@ class PartialFactor(Factor):
 
     def reduce_side(self, right: np.ndarray) -> Remainder:
         """What is left of a right side (6·n + s,)."""
-        s = self._symbolic
-        x = np.asfortranarray(right[self._permutation()] * self._scale)
-        for k, front in enumerate(s.fronts[:-1]):
-            top, low = s.panel(k)
-            own = slice(B * front.first, B * (front.first + front.n_own))
-            x[own] = dtrsm(1.0, top, x[own][:, None], lower=1)[:, 0]
-            if len(front.scalar_rows):
-                x[front.scalar_rows] -= low @ x[own]
+        x = self.reduce_sides(right[:, None])[:, 0]
         inner = len(x) - self.kept
         return Remainder(x[inner:].copy(), x, float(x[:inner] @ x[:inner]))
 
+    def reduce_sides(self, right: np.ndarray) -> np.ndarray:
+        """L⁻¹·b of what is eliminated, and what is left of the others, of right sides (6·n + s, k), in that order."""
+        s = self._symbolic
+        x = np.asfortranarray(right[self._permutation()] * self._scale[:, None])
+        for k, front in enumerate(s.fronts[:-1]):
+            top, low = s.panel(k)
+            own = slice(B * front.first, B * (front.first + front.n_own))
+            x[own] = dtrsm(1.0, top, x[own], lower=1)
+            if len(front.scalar_rows):
+                x[front.scalar_rows] -= low @ x[own]
+        return x
+
     def expand(self, half: np.ndarray, root: np.ndarray) -> np.ndarray:
         """(6·n + s,) solution of all unknowns from that of those that stay, root (6·k + s,)."""
+        return self.expand_sides(half[:, None], root[:, None])[:, 0]
+
+    def expand_sides(self, half: np.ndarray, root: np.ndarray) -> np.ndarray:
+        """(6·n + s, m) solutions of all unknowns from those of what stays, root (6·k + s, m).
+
+        Parameters
+        ----------
+        half : of `reduce_sides`.
+        """
         s = self._symbolic
-        x = half.copy()
+        x = half.copy(order="F")
         x[len(x) - self.kept :] = root
         for k in range(len(s.fronts) - 2, -1, -1):
             front = s.fronts[k]
             top, low = s.panel(k)
             own = slice(B * front.first, B * (front.first + front.n_own))
             side = x[own] - low.T @ x[front.scalar_rows]
-            x[own] = dtrsm(1.0, top, side[:, None], lower=1, trans_a=1)[:, 0]
-        out = np.empty_like(x)
-        out[self._permutation()] = x * self._scale
+            x[own] = dtrsm(1.0, top, side, lower=1, trans_a=1)
+        out = np.empty(x.shape)
+        out[self._permutation()] = x * self._scale[:, None]
         return out
 
     def inverse_below(self, root: np.ndarray) -> Inverse:

@@ -49,7 +49,7 @@ def solve_sides(
     """
     u = system.unknowns
     n, k = len(u.images), sides.shape[2]
-    right = _reduced_sides(system, state, sides, estimator, rows)
+    right = reduced_sides(system, state, sides, estimator, rows)
     right[6 * n + u.kept_columns] += sides[u.kept_rows]
     if shared_sides is not None:
         right[6 * n :] += shared_sides
@@ -58,10 +58,15 @@ def solve_sides(
     return images, shared, expand_sides(system, state, images, shared, sides, estimator, rows)
 
 
-def _reduced_sides(
-    system: NormalSystem, state: State, sides: np.ndarray, estimator: Estimator, rows: np.ndarray | None
+def reduced_sides(
+    system: NormalSystem, state: State, sides: np.ndarray, estimator: Estimator, rows: np.ndarray | None = None
 ) -> np.ndarray:
-    """(6·n + s, k) what right sides of points (P, 3, k) leave for the others once the points are eliminated."""
+    """(6·n + s, k) what right sides of points (P, 3, k) leave for the others once the points are eliminated.
+
+    Parameters
+    ----------
+    rows : the points that have sides, where these are few; all unless given.
+    """
     u = system.unknowns
     n, s, k = len(u.images), len(u.shared), sides.shape[2]
     free, problem = np.ascontiguousarray(sides * u.point_free[:, :, None]), system.problem(state, estimator)

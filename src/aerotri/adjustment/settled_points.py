@@ -34,7 +34,7 @@ def settled_points(system: NormalSystem, state: State, estimator: Estimator, var
     settled, limit = replace(state, points=state.points.copy()), SETTLED**2 * variance
     system.over_points(
         system.problem(settled, estimator),
-        lambda first, last, problem, work: _settling_kernels.settle_slow_points(
+        lambda first, last, problem, work: _settling_kernels.settle_points(
             first, last, problem, MOST_STEPS, limit, work
         ),
     )

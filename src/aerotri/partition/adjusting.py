@@ -17,6 +17,7 @@ from aerotri.observations import Block
 from aerotri.partition.common import Common, PartFacts
 from aerotri.partition.course import Course, Ended
 from aerotri.partition.joints import LEAST_BYTES, Joints
+from aerotri.partition.model_part import model_part_of
 from aerotri.partition.part_list import part_folders
 from aerotri.partition.part_picture import SAMPLE_RAYS
 from aerotri.partition.part_results import Ending, Written, measure_part, write_part
@@ -26,6 +27,7 @@ from aerotri.partition.placing import Place, place_of
 from aerotri.partition.telling import Say, Told
 from aerotri.partition.whole import PARTS, Whole, whole_of
 from aerotri.results.adjusted_block import Outcome
+from aerotri.statistics.model_part import of_parameters
 from aerotri.statistics.summarise import parameters_of
 
 WORK = "work"
@@ -125,11 +127,15 @@ def _with_sigma(
         iterations=ended.iterations, sigma0=sigma0, sigma0_um=sigma0 * first.settings.image_sigma_um, vtpv=vtpv,
         observations=observations, unknowns=unknowns, conditions=0, redundancy=observations - unknowns,
     )  # fmt: skip
-    written: list[Written] = course.run(
-        write_part, Ending(place.at, outcome, (out / PARTS).resolve(), every, place_of_block)
-    )
+    model = model_part_of(course, place, first, ended.status, sigma0, photographs)
+    course.begin("tables")
+    ending = Ending(place.at, outcome, (out / PARTS).resolve(), every, place_of_block, model.part, model.shared)
+    written: list[Written] = course.run(write_part, ending)
     parameters = parameters_of(common.labels, place.at.shared, corner.inverse, common.weighted, sigma0)
-    return whole_of(first, outcome, parameters, [task.name for task in course.tasks], written, photographs, every)
+    if model.shared is not None:
+        kinds = [kind for _, _, kind, _ in common.labels]
+        parameters = replace(parameters, model=of_parameters(kinds, model.shared, len(parameters)))
+    return whole_of(first, outcome, parameters, written, photographs, every, model.part)
 
 
 def _reading(setting: Setting, tasks: list[PartTask], work: Path) -> Work[Setting, PartTask, PartFacts]:

@@ -41,6 +41,7 @@ from aerotri.partition.part_tasks import (
     refuse_fault,
     settle_part,
 )
+from aerotri.partition.telling import Told
 
 MOST_SCALES = 20
 """Times that the robust scale follows the residuals within one stage, as in one piece."""
@@ -103,6 +104,11 @@ class Course:
         return self._executor.run(
             Work(function, shared, self.tasks, names, "parts", self._folder, bytes_each=self._bytes)
         )
+
+    def begin(self, stage: str) -> None:
+        """Say what the tasks that follow belong to."""
+        if isinstance(self._executor, Told):
+            self._executor.stage = stage
 
     def minimise(self, robust: str, max_iterations: int) -> Ended:
         """From the start values through the stages of the estimator, then with parameters at adjusted image points."""

@@ -110,7 +110,7 @@ def join(tag: str, task: JointTask) -> Joined:
         scale = front.eliminate(diagonal[:own])
     except NotPositiveDefiniteError:
         return Joined(np.inf, determined=False)
-    half, rest = half_solved(front, scale, right)
+    half, rest = (part[:, 0] for part in half_solved(front, scale, right[:, None]))
     task.files.keep_eliminated(front, scale, half, tag)
     task.files.keep_left(Left(front.rest, rest, diagonal[own:]), tag)
     return Joined(float(half @ half))
@@ -121,7 +121,8 @@ def follow(tag: str, task: JointTask) -> None:
     files = task.files
     front, scale, half = files.eliminated(task.border, tag)
     above = files.array(f"shared_{tag}") if task.above is None else task.above.solution(tag)
-    files.keep_array(f"{SOLUTION}_{tag}", np.concatenate([solved_back(front, scale, half, above), above]))
+    own = solved_back(front, scale, half[:, None], above[:, None])[:, 0]
+    files.keep_array(f"{SOLUTION}_{tag}", np.concatenate([own, above]))
 
 
 def invert(tag: str, task: JointTask) -> None:

@@ -14,7 +14,7 @@ from aerotri.adjustment.sparse_cholesky import PIVOT_LIMIT, NotPositiveDefiniteE
 from aerotri.execution.work import Executor, Work
 from aerotri.partition.common import Common, Left
 from aerotri.partition.joint_tasks import Above, Joined, JointTask, follow, invert, join
-from aerotri.partition.part_files import WorkFiles
+from aerotri.partition.part_files import JointFiles, WorkFiles
 from aerotri.partition.part_tasks import PartTask
 from aerotri.partition.tree import PartsTree, tree_over
 
@@ -72,26 +72,25 @@ class Joints:
         """
         if tag not in self._corners:
             decrement = sum(self._joined(tag, level) for level in self.tree.upwards())
-            root = self.tasks[-1].files
-            left = self._common.with_priors(root.left(tag), shared, damping)
-            root.drop_left(tag)
+            left = self._common.with_priors(self.root.left(tag), shared, damping)
+            self.root.drop_left(tag)
             self._corners[tag] = _corner(left, decrement)
         return self._corners[tag]
 
     def follow(self, tag: str) -> None:
         """The solution of everything that is shared, for the parts to read."""
-        self.tasks[-1].files.keep_array(f"shared_{tag}", self._corners[tag].step)
+        self.root.keep_array(f"shared_{tag}", self._corners[tag].step)
         for level in self.tree.downwards():
-            self._run(follow, tag, level)
+            self.run(follow, tag, level)
 
     def invert(self, tag: str) -> None:
         """The inverse over what is shared, for the parts to read."""
-        self.tasks[-1].files.keep_array("corner", self._corners[tag].inverse)
+        self.root.keep_array("corner", self._corners[tag].inverse)
         parents = self.tree.parents()
         needed = {parents[k] for k in range(len(self.parts))}
         levels = self.tree.downwards()
         for k, level in enumerate(levels):
-            self._run(invert, tag, level)
+            self.run(invert, tag, level)
             for joint in levels[k - 1] if k else []:
                 if joint not in needed:
                     self.tasks[joint].files.drop_inverse()
@@ -99,13 +98,13 @@ class Joints:
     def drop(self, tag: str) -> None:
         """What belongs to the equations at one place."""
         self._corners.pop(tag, None)
-        self.tasks[-1].files.drop(f"shared_{tag}")
+        self.root.drop(f"shared_{tag}")
         for task in self.tasks:
             task.files.drop_place(tag)
 
     def _joined(self, tag: str, level: Sequence[int]) -> float:
         """Decrement of a level; what its children left is not needed any more."""
-        found: list[Joined] = self._run(join, tag, level)
+        found: list[Joined] = self.run(join, tag, level)
         if not all(one.determined for one in found):
             raise NotPositiveDefiniteError
         for joint in level:
@@ -113,11 +112,17 @@ class Joints:
                 files.drop_left(tag)
         return sum(one.decrement for one in found)
 
-    def _run(self, function: Callable[[str, JointTask], Any], tag: str, level: Sequence[int]) -> list[Any]:
+    def run(self, function: Callable[[Any, JointTask], Any], shared: Any, level: Sequence[int]) -> list[Any]:
+        """A task for every joint of a level."""
         tasks = [self.tasks[k] for k in level]
         most = max(task.bytes_needed for task in tasks) + LEAST_BYTES
         names = [f"joint {task.name}" for task in tasks]
-        return self._executor.run(Work(function, tag, tasks, names, "joints", self._folder, bytes_each=most))
+        return self._executor.run(Work(function, shared, tasks, names, "joints", self._folder, bytes_each=most))
+
+    @property
+    def root(self) -> JointFiles:
+        """Where the shared parameters are solved for."""
+        return self.tasks[-1].files
 
     def _above(self, parts: int) -> list[Above | None]:
         """Where every part and every joint but the root stands."""

@@ -53,7 +53,7 @@ class WorkFiles:
             return pickle.load(file)
 
     def keep_array(self, name: str, values: np.ndarray) -> None:
-        self._keep(name, lambda file: np.save(file, values))
+        self._keep(name, lambda file: np.save(_Plain(file), values))
 
     def array(self, name: str) -> np.ndarray:
         return np.load(self.folder / name)
@@ -72,6 +72,17 @@ class WorkFiles:
             os.replace(part, self.folder / name)
         finally:
             part.unlink(missing_ok=True)
+
+
+class _Plain:
+    """A file that numpy does not take for one: into a file it writes by itself, and then a full disk has no name."""
+
+    def __init__(self, file: BinaryIO):
+        self._file = file
+
+    def write(self, part: bytes) -> int:
+        """Write a part of the file."""
+        return self._file.write(part)
 
 
 @dataclass(frozen=True)

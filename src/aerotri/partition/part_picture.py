@@ -11,7 +11,8 @@ import numpy as np
 from aerotri.diagnosis import findings
 from aerotri.diagnosis.finding import Finding
 from aerotri.diagnosis.work_list import WorkList, work_list
-from aerotri.observations import GnssIns, ImagePoints, Images
+from aerotri.observations import ImagePoints, Images
+from aerotri.partition.photographs import images_together, positions_together
 from aerotri.results.adjusted_block import AdjustedBlock, ImageResults, PointResults, RayResults
 from aerotri.statistics.photograph_residuals import ResidualSums, residual_sums
 from aerotri.statistics.reliability import critical_value
@@ -103,7 +104,8 @@ def _restricted(found: AdjustedBlock, chosen: np.ndarray) -> AdjustedBlock:
             ),
         ),
         points=PointResults(
-            points.xyz[chosen], points.covariance[chosen], points.rays[chosen], points.max_abs_w[chosen]
+            points.xyz[chosen], points.covariance[chosen], points.rays[chosen], points.max_abs_w[chosen],
+            None if points.model is None else points.model[chosen],
         ),
         rays=RayResults(r.v[own], r.r[own], r.w[own], r.weight[own], r.status[own]),
         observations=None,
@@ -126,9 +128,12 @@ def together(record: AdjustedBlock, parts: Sequence[AdjustedBlock]) -> AdjustedB
     points = PointResults(
         np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan), np.zeros(count, int), np.full(count, np.nan)
     )
+    model = None if any(one.points.model is None for one in parts) else np.full((count, 3, 3), np.nan)
     for one, at in zip(parts, place, strict=True):
         points.xyz[at], points.covariance[at] = one.points.xyz, one.points.covariance
         points.rays[at], points.max_abs_w[at] = one.points.rays, one.points.max_abs_w
+        if model is not None:
+            model[at] = one.points.model
     of_parts = [one.block.image_points for one in parts]
     rays = ImagePoints(
         np.concatenate([own[r.image] for own, r in zip(row_of, of_parts, strict=True)]),
@@ -141,9 +146,10 @@ def together(record: AdjustedBlock, parts: Sequence[AdjustedBlock]) -> AdjustedB
     }
     block = replace(
         record.block, images=photographs, points=np.array(list(row), dtype=str), image_points=rays,
-        gnss_ins=_positions(parts, row_of),
+        gnss_ins=positions_together([part.block.gnss_ins for part in parts], row_of),
     )  # fmt: skip
-    return replace(record, block=block, images=_orientations(parts, row_of, len(photographs)), points=points,
+    return replace(record, block=block, images=_orientations(parts, row_of, len(photographs)),
+                   points=replace(points, model=model),
                    rays=RayResults(**results))  # fmt: skip
 
 
@@ -170,19 +176,7 @@ def rows_of_parts(parts: Sequence[AdjustedBlock]) -> list[np.ndarray]:
 
 
 def _photographs(parts: Sequence[AdjustedBlock]) -> tuple[Images, list[np.ndarray]]:
-    """All photographs, part by part, shared ones once; rows of those of every part."""
-    row: dict[str, int] = {}
-    row_of = [np.array([row.setdefault(n, len(row)) for n in p.block.images.names.tolist()], np.int64) for p in parts]
-    given = [p.block.images for p in parts]
-    _, first = np.unique(np.concatenate(row_of), return_index=True)
-    return Images(
-        np.concatenate([one.names for one in given])[first],
-        np.concatenate([one.camera for one in given])[first],
-        np.concatenate([one.strip for one in given])[first],
-        np.concatenate([one.centre for one in given])[first],
-        np.concatenate([one.angles for one in given])[first],
-        {name: np.concatenate([one.columns[name] for one in given])[first] for name in given[0].columns},
-    ), row_of
+    return images_together([part.block.images for part in parts])
 
 
 def _orientations(parts: Sequence[AdjustedBlock], row_of: Sequence[np.ndarray], count: int) -> ImageResults:
@@ -190,25 +184,11 @@ def _orientations(parts: Sequence[AdjustedBlock], row_of: Sequence[np.ndarray], 
     found = ImageResults(
         np.full((count, 3), np.nan), np.full((count, 3), np.nan), np.full((count, 6, 6), np.nan), np.zeros(count, int)
     )
+    if not any(one.images.model is None for one in parts):
+        found = replace(found, model=np.full((count, 6, 6), np.nan))
     for one, rows in zip(parts, row_of, strict=True):
         known = np.isfinite(one.images.centre).all(axis=1)
-        for key in ("centre", "angles", "covariance"):
+        for key in ("centre", "angles", "covariance", *(("model",) if found.model is not None else ())):
             getattr(found, key)[rows[known]] = getattr(one.images, key)[known]
         found.rays[rows] += one.images.rays
     return found
-
-
-def _positions(parts: Sequence[AdjustedBlock], row_of: Sequence[np.ndarray]) -> GnssIns | None:
-    """Observed positions of all parts: each stands in one."""
-    there = [(one.block.gnss_ins, rows) for one, rows in zip(parts, row_of, strict=True)]
-    given = [(gnss, rows) for gnss, rows in there if gnss is not None and len(gnss)]
-    if not given:
-        return None
-    return GnssIns(
-        np.concatenate([rows[gnss.image] for gnss, rows in given]),
-        np.concatenate([gnss.xyz for gnss, _ in given]),
-        np.concatenate([gnss.sigma for gnss, _ in given]),
-        np.concatenate([gnss.angles for gnss, _ in given]),
-        np.concatenate([gnss.angles_sigma for gnss, _ in given]),
-        np.concatenate([gnss.time for gnss, _ in given]),
-    )

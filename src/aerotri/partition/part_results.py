@@ -11,6 +11,7 @@ from aerotri.adjustment.partial_factor import restored
 from aerotri.adjustment.point_sides import point_cofactors
 from aerotri.adjustment.ray_status import RayStatus
 from aerotri.adjustment.solve import Solution
+from aerotri.adjustment.unknowns import Unknowns
 from aerotri.diagnosis import judge
 from aerotri.formats.block.folder import read_block
 from aerotri.formats.results.adjustment import write_result
@@ -18,13 +19,15 @@ from aerotri.partition.part_picture import PartPicture, picture_of
 from aerotri.partition.part_tasks import At, PartTask
 from aerotri.partition.placing import Place
 from aerotri.results.adjusted_block import AdjustedBlock, Blunder, GroundPointResults, ObservationGroup, Outcome
-from aerotri.results.in_crs import transform_result
+from aerotri.results.in_crs import transform_result, with_model_of
+from aerotri.results.model_part import ModelPart
 from aerotri.statistics.covariance import Cofactors
 from aerotri.statistics.held_control import no_held_tests
+from aerotri.statistics.model_part import spread_over_block
 from aerotri.statistics.summarise import record_of, turned_down, weighted_sum
 
-MEASURED = "measured"
-"""File of a part: solution and cofactors."""
+MEASURED, MODEL = "measured", "model"
+"""Files of a part: solution and cofactors; the model part of photographs and points."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class Ending:
     ----------
     at : where. outcome : of the whole. folder : for the folders of the parts, by name.
     every : one point of so many goes to the page of the whole. place : see `Setting`.
+    model_part : of the whole. shared_model : (s, s) that of all shared parameters; None where there is none.
     """
 
     at: At
@@ -55,6 +59,8 @@ class Ending:
     folder: Path
     every: int
     place: Place | None
+    model_part: ModelPart
+    shared_model: np.ndarray | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +85,12 @@ class Written:
 
     Parameters
     ----------
-    verdict : 'accepted', 'doubtful' or 'rejected'. reasons : sentences.
+    name : of the part. verdict : 'accepted', 'doubtful' or 'rejected'. reasons : sentences.
     control, check : its ground points. groups : of its observations. blunders : suspected gross errors.
     points, rays : how many; rays that were used. picture : for the page of the whole.
     """
 
+    name: str
     verdict: str
     reasons: tuple[str, ...]
     control: GroundPoints
@@ -119,19 +126,33 @@ def write_part(ending: Ending, task: PartTask) -> Written:
     solution, q = task.files.object(MEASURED)
     outcome = replace(ending.outcome, warnings=part.warnings)
     found = record_of(part.system, solution, q, outcome, no_held_tests(part.system), part.ray_status)
+    found = _with_model(found, ending, part.system.unknowns, task)
     verdict = judge(found)
     found = replace(found, outcome=replace(outcome, verdict=verdict.level, reasons=verdict.reasons))
     result = found
     if ending.place is not None:
-        result = transform_result(found, read_block(task.source, rays_needed=False), ending.place.frame())
+        frame = ending.place.frame()
+        result = with_model_of(transform_result(found, read_block(task.source, rays_needed=False), frame), found, frame)
     write_result(result, ending.folder / task.name)
     shared = np.zeros(len(found.block.images), bool)
     shared[part.system.unknowns.images[part.kept]] = True
     return Written(
-        verdict.level, verdict.reasons, _ground_points(result, result.control), _ground_points(result, result.check),
+        task.name, verdict.level, verdict.reasons,
+        _ground_points(result, result.control), _ground_points(result, result.check),
         found.groups, found.blunders, len(found.block.points), int(np.sum(found.rays.status == RayStatus.USED)),
         picture_of(found, result, shared, ending.every),
     )  # fmt: skip
+
+
+def _with_model(found: AdjustedBlock, ending: Ending, unknowns: Unknowns, task: PartTask) -> AdjustedBlock:
+    """With the model part of the whole, where there is one."""
+    found = replace(found, model_part=ending.model_part)
+    if ending.shared_model is None:
+        return found
+    images, points = task.files.object(MODEL)
+    own = np.ix_(task.shared, task.shared)
+    found = spread_over_block(unknowns, found, images, ending.shared_model[own], points)
+    return with_model_of(found, found, None)
 
 
 def _ground_points(found: AdjustedBlock, results: GroundPointResults) -> GroundPoints:

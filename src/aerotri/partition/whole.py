@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.diagnosis.finding import GRADES
+from aerotri.diagnosis.moving_errors import model_part_in_words
 from aerotri.formats.results.adjustment import adjustment_json, ground_point_columns, parameter_columns, write_csv
 from aerotri.formats.results.evaluation import work_columns
 from aerotri.formats.results.json_text import write_json
@@ -30,10 +31,6 @@ from aerotri.results.adjusted_block import (
 )
 from aerotri.results.model_part import ModelPart
 
-NO_MODEL_PART = (
-    "σ holds for independent errors of the image points. What photographs of a strip, a direction of flight or a day "
-    "have in common (the model part of σ) is not in it, because the block was adjusted in parts"
-)
 NOT_LOOKED_FOR = (
     "Not looked for, because the block was adjusted in parts: weak points to be set aside, GNSS errors that stay for "
     "seconds to minutes, the effect of additional parameters on check points"
@@ -68,8 +65,8 @@ class Whole:
 
 
 def whole_of(
-    first: Block, outcome: Outcome, parameters: SharedParameters, names: Sequence[str], written: Sequence[Written],
-    photographs: int, every: int,
+    first: Block, outcome: Outcome, parameters: SharedParameters, written: Sequence[Written], photographs: int,
+    every: int, model_part: ModelPart,
 ) -> Whole:  # fmt: skip
     """What the parts say together.
 
@@ -82,7 +79,8 @@ def whole_of(
     points = np.concatenate([p.control.names for p in written] + [p.check.names for p in written])
     adjusted = np.concatenate([p.control.adjusted for p in written] + [p.check.adjusted for p in written])
     worst = max((part.verdict for part in written), key=GRADES.index)
-    reasons = [f"part {name}: {said}" for name, part in zip(names, written, strict=True) for said in part.reasons]
+    names = tuple(part.name for part in written)
+    reasons = [f"part {part.name}: {said}" for part in written for said in part.reasons]
     nothing = np.zeros(0, dtype=np.int64)
     block = replace(
         first,
@@ -110,7 +108,7 @@ def whole_of(
             verdict=worst,
             reasons=tuple(reasons[:MOST_REASONS]),
             notes=(note, NOT_LOOKED_FOR),
-            warnings=_said_first(first, names, written),
+            warnings=tuple(text for text in (model_part_in_words(model_part),) if text),
         ),
         images=ImageResults(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 6, 6)), nothing),
         points=PointResults(adjusted, np.zeros((len(points), 3, 3)), np.zeros(len(points), int), np.zeros(len(points))),
@@ -120,28 +118,17 @@ def whole_of(
         check=of_check,
         groups=_groups(written),
         blunders=_largest(written),
-        model_part=ModelPart(reason=NO_MODEL_PART),
+        model_part=model_part,
     )
     rows = [
         PartRow(
-            name, one.picture.photographs, one.picture.shared, one.points, one.rays, one.picture.largest_w,
+            one.name, one.picture.photographs, one.picture.shared, one.points, one.rays, one.picture.largest_w,
             one.picture.beyond, one.picture.sigma, one.verdict,
         )
-        for name, one in zip(names, written, strict=True)
+        for one in written
     ]  # fmt: skip
     picture = whole_picture(record, [one.picture for one in written], rows, every)
-    return Whole(record, tuple(names), photographs, count_points, count_rays, picture)
-
-
-def _said_first(first: Block, names: Sequence[str], written: Sequence[Written]) -> tuple[str, ...]:
-    """That σ has no model part, and how to test whether there is one; nothing where the block asks for none."""
-    if first.settings.adjustment.model_part == "off":
-        return ()
-    largest = max(zip(names, written, strict=True), key=lambda one: one[1].rays)[0]
-    return (
-        f"{NO_MODEL_PART}. Test it on a part: aerotri adjust BLOCK/{PARTS}/{largest} says by how much its total σ are "
-        "larger",
-    )
+    return Whole(record, names, photographs, count_points, count_rays, picture)
 
 
 def write_whole(whole: Whole, folder: Path) -> None:
@@ -167,9 +154,11 @@ def _ground_points(parts: Sequence[GroundPoints], is_check: bool, first: int) ->
         np.full(count, is_check),
     )  # fmt: skip
     found = [part.results for part in parts]
+    of_model = [one.model_sigma for one in found if one.model_sigma is not None]
     return control, GroundPointResults(
         point,
         *(np.concatenate([getattr(one, key) for one in found]) for key in ("difference", "sigma", "r", "w", "rays")),
+        model_sigma=np.concatenate(of_model) if len(of_model) == len(found) else None,
     )
 
 

@@ -4,56 +4,57 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-
-import numpy as np
+from functools import partial
 
 from aerotri.diagnosis.moving_errors import model_part_in_words
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.in_crs import with_model_of
-from aerotri.results.model_part import FIELD, GROUPS, ClusterTest, ModelPart
-from aerotri.statistics.cluster_fields import root_of_field
+from aerotri.results.model_part import FIELD, GROUPS, ModelPart
+from aerotri.statistics.cluster_fields import fitted_field, root_of_field
 from aerotri.statistics.cluster_test import LEVEL
-from aerotri.statistics.clusters import PHOTOGRAPH
+from aerotri.statistics.clusters import cluster_schemes
 from aerotri.statistics.covariance import cofactors, inner_datum
 from aerotri.statistics.model_part import (
-    Excess,
+    chosen_scheme,
     compare_few,
     compare_schemes,
     excess_of_clusters,
     excess_of_root,
+    growth_of,
+    spread_over_block,
+    squares_by,
+    why_none,
     why_not,
     with_ratios,
 )
-from aerotri.statistics.summarise import OF_POINTS
 
 
 def with_model_part(found: Adjustment) -> Adjustment:
     """The adjustment with the model part of σ where groups of photographs share errors; else why there is none."""
     begun = time.perf_counter()
     system, solution, sigma0 = found.system, found.solution, found.local.outcome.sigma0
-    reason = why_not(system, solution, sigma0)
+    u = system.unknowns
+    reason = why_not(u.block.settings.adjustment.model_part, len(u.images), solution.status, sigma0)
     if reason:
         return _with(found, replace(found.local, model_part=ModelPart(reason=reason)), begun)
     factor = system.factorise(solution.equations)
-    schemes, tests = compare_schemes(system, solution, factor, sigma0)
-    tests, fields = compare_few(system, solution, factor, schemes, tests, sigma0)
+    centre = solution.state.centre
+    schemes = cluster_schemes(u.block, u.images, centre)
+    tests = compare_schemes(schemes, centre, sigma0, partial(squares_by, system, solution, factor))
+    tests, fields = compare_few(schemes, tests, centre, partial(fitted_field, system, solution, factor, sigma0))
     part = ModelPart(level=LEVEL, tests=tests)
-    chosen = _chosen(tests)
+    chosen = chosen_scheme(tests)
     if chosen is None:
-        untested = all(test.reason for test in tests)
-        reason = (
-            tests[0].reason if untested and tests else "no group of photographs has errors that noise does not explain"
-        )
-        return _with(found, replace(found.local, model_part=replace(part, reason=reason)), begun)
-    u, clusters = system.unknowns, schemes[chosen]
+        return _with(found, replace(found.local, model_part=replace(part, reason=why_none(tests))), begun)
+    clusters = schemes[chosen]
     part = replace(part, scheme=clusters.scheme, clusters=len(clusters), method=FIELD if chosen in fields else GROUPS)
     inner = None
     if u.block.settings.adjustment.datum == "inner" and u.motions.count:
         inner = inner_datum(system, solution.state, factor, solution.estimator)
     if chosen in fields:
-        root = root_of_field(system, solution, factor, clusters, fields[chosen], inner)
-        excess = excess_of_root(system, solution, root)
+        root, squares = root_of_field(system, solution, factor, clusters, fields[chosen], inner)
+        excess = excess_of_root(system, solution, root, squares)
     elif inner is not None:
         q = cofactors(system, solution.state, factor, solution.estimator)
         excess = excess_of_clusters(system, solution, factor, clusters, sigma0, q.images, q.shared, q.points, inner)
@@ -62,32 +63,9 @@ def with_model_part(found: Adjustment) -> Adjustment:
             system, solution, factor, clusters, sigma0, factor.inverse_on_pattern().blocks[: len(u.images)].copy(),
             factor.border_inverse(), found.local.points.covariance[u.points] / sigma0**2,
         )  # fmt: skip
-    return replace(_with(found, _spread_over_block(found, excess, part), begun), model=excess.root)
-
-
-def _chosen(tests: tuple[ClusterTest, ...]) -> int | None:
-    """The number of the scheme with the largest ratio of those that count; single photographs where no other does."""
-    counting = [(test.scheme != PHOTOGRAPH, test.ratio, k) for k, test in enumerate(tests) if test.counts]
-    return max(counting)[2] if counting else None
-
-
-def _spread_over_block(found: Adjustment, excess: Excess, part: ModelPart) -> AdjustedBlock:
-    """The local result with the model part in the rows of the block; zero where it has no covariance to go with."""
-    u, local = found.system.unknowns, found.local
-    points, images = np.full_like(local.points.covariance, np.nan), np.full_like(local.images.covariance, np.nan)
-    points[u.points], images[u.images] = excess.points, excess.images
-    kinds = np.array(u.shared.kinds, dtype=object).astype(str)
-    own = np.flatnonzero(~np.isin(kinds, OF_POINTS))
-    shared = np.zeros((len(local.parameters), len(local.parameters)))
-    shared[: len(own), : len(own)] = excess.shared[np.ix_(own, own)]
-    model = np.sqrt(np.diagonal(points, axis1=1, axis2=2))
-    return replace(
-        local,
-        points=replace(local.points, model=points),
-        images=replace(local.images, model=images),
-        parameters=replace(local.parameters, model=shared),
-        model_part=with_ratios(part, local.points.sigma, model),
-    )
+    part = with_ratios(part, growth_of(found.local.points.covariance[u.points], excess.points))
+    local = replace(spread_over_block(u, found.local, excess.images, excess.shared, excess.points), model_part=part)
+    return replace(_with(found, local, begun), model=excess.root)
 
 
 def _with(found: Adjustment, local: AdjustedBlock, begun: float) -> Adjustment:

@@ -13,6 +13,7 @@ eliminated beforehand: it does not move. The unknowns get from the fields the co
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,9 +23,10 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.point_sides import expand_sides
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.observations.block import Camera
 from aerotri.results.model_part import ClusterTest, ModelRoot
 from aerotri.statistics import _field_kernels as _kernels
-from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, SAME
+from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, SAME, Settled
 from aerotri.statistics.clusters import Clusters, divided_at_random
 from aerotri.statistics.covariance import InnerDatum
 
@@ -76,23 +78,23 @@ class FieldEquations:
 
 
 def compare_field(
-    system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters, sigma0: float, level: float
+    fitted: Callable[[Clusters], Field], clusters: Clusters, centre: np.ndarray, level: float
 ) -> tuple[ClusterTest, Field]:
     """The test of one scheme by its fields, against white noise and against random divisions.
 
     Parameters
     ----------
-    factor : undamped, at the solution. level : below which both probabilities have to be.
+    fitted : gives the field that fits clusters best. centre : (n, 3) m, of the photographs.
+    level : below which both probabilities have to be.
     """
-    field = _fitted(system, solution, factor, clusters, sigma0)
+    field = fitted(clusters)
     # two unknowns, σ_s and ℓ: of white noise the gain is below χ² with two degrees of freedom
     p_noise, ratio_random, p_random = float(np.exp(-0.5 * field.gain)), float("nan"), float("nan")
     if p_noise < level and len(clusters) > 1:
         rng = np.random.default_rng(len(clusters.label))
         others: list[Field] = []
         for _ in range(DIVISIONS):
-            label = divided_at_random(solution.state.centre, clusters.label, rng)
-            others.append(_fitted(system, solution, factor, replace(clusters, label=label), sigma0))
+            others.append(fitted(replace(clusters, label=divided_at_random(centre, clusters.label, rng))))
         best = max(others, key=lambda other: other.gain)
         ratio_random = best.ratio
         p_random = float(np.exp(-0.5 * max(field.gain - best.gain, 0.0)))
@@ -107,27 +109,43 @@ def compare_field(
 def root_of_field(
     system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters, field: Field,
     inner: InnerDatum | None = None,
-) -> ModelRoot:  # fmt: skip
-    """The columns F of the fields, see above; in the inner datum where there is one."""
+) -> tuple[ModelRoot, np.ndarray]:  # fmt: skip
+    """The columns F of the fields, see above, and F·Fᵀ of the points (P, 3, 3); in the inner datum if there is one."""
     u = system.unknowns
-    n, s, count = len(u.images), len(u.shared), len(u.points)
     equations = field_equations(system, solution, factor, clusters)
-    size, k, m = equations.nodes.count, field.root.shape[1], len(equations.camera)
-    apart = equations.sides.reshape(6 * n + s, 2 * m, size) @ field.root
-    x = factor.solve(np.ascontiguousarray(apart.reshape(6 * n + s, 2 * m * k)))
-    images = x[: 6 * n].reshape(n, 6, -1) * u.eo_free[:, :, None]
-    shared, points = x[6 * n :], np.empty((count, 3, 2 * m * k), np.float32)
-    problem = system.problem(solution.state, solution.estimator)
+    x = factor.solve(of_patterns(equations.sides, field.root))
+    images, shared = x[: 6 * len(u.images)].reshape(len(u.images), 6, -1), x[6 * len(u.images) :]
+    images = images * u.eo_free[:, :, None]
+    points, squares = np.empty((len(u.points), 3, x.shape[1]), np.float32), np.zeros((len(u.points), 3, 3))
+    for own, columns in columns_of_points(system, solution, equations.nodes, field.root, x):
+        points[:, :, own] = columns
+        squares += columns @ np.swapaxes(columns, 1, 2)
+    if inner is not None:
+        images, shared, points = inner.moved(images, shared, points)
+        squares = points @ np.swapaxes(points, 1, 2)
+    return ModelRoot(images, shared, points.astype(np.float32, copy=False), 0.0), squares
+
+
+def of_patterns(sides: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """(6n + s, ·) sides of the patterns, root (nodes, k), from those of the nodes of all clusters."""
+    apart = sides.reshape(len(sides), -1, len(root)) @ root
+    return np.ascontiguousarray(apart.reshape(len(sides), -1))
+
+
+def columns_of_points(
+    system: NormalSystem, solution: Settled, nodes: _kernels.Nodes, root: np.ndarray, x: np.ndarray
+) -> Iterator[tuple[slice, np.ndarray]]:
+    """Some columns after others and the solutions of the points (P, 3, ·), from all of `of_patterns`, x (6n + s, ·)."""
+    u, k = system.unknowns, root.shape[1]
+    n, count = len(u.images), len(u.points)
+    m, problem = x.shape[1] // (2 * k), system.problem(solution.state, solution.estimator)
     at_once = max(int(NUMBERS_AT_ONCE / (6 * max(count, 1) * k)), 1)
     for first in range(0, m, at_once):
         parts = slice(first, min(first + at_once, m))
         own = slice(2 * k * parts.start, 2 * k * parts.stop)
-        columns = _point_sides(system, problem, equations.nodes, field.root, parts)
-        of_images, of_shared = np.ascontiguousarray(images[:, :, own]), np.ascontiguousarray(shared[:, own])
-        points[:, :, own] = expand_sides(system, solution.state, of_images, of_shared, columns, solution.estimator)
-    if inner is not None:
-        images, shared, points = inner.moved(images, shared, points)
-    return ModelRoot(images, shared, points.astype(np.float32, copy=False), 0.0)
+        sides = _point_sides(system, problem, nodes, root, parts)
+        images, shared = np.ascontiguousarray(x[: 6 * n, own]).reshape(n, 6, -1), np.ascontiguousarray(x[6 * n :, own])
+        yield own, expand_sides(system, solution.state, images, shared, sides, solution.estimator)
 
 
 def _point_sides(
@@ -150,8 +168,24 @@ def _point_sides(
 def field_equations(system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters) -> FieldEquations:
     """The rays over the nodes of all clusters, photographs, shared parameters and points eliminated."""
     u = system.unknowns
-    label, camera = _by_camera(system, clusters)
-    nodes = _nodes(system, label)
+    label, camera = by_camera(clusters, u.block.images.camera[u.images])
+    nodes = nodes_of(system, label)
+    sides, own, scores = field_sums(system, solution, nodes, camera)
+    half = factor.half_solve(sides)
+    normals = own - half.T @ half
+    return FieldEquations(nodes, camera, sides, 0.5 * (normals + normals.T), scores)
+
+
+def field_sums(
+    system: NormalSystem, solution: Settled, nodes: _kernels.Nodes, camera: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """AᵀPB (6n + s, k) and BᵀPB (k, k) with the points eliminated, and BᵀPv (k,).
+
+    Parameters
+    ----------
+    camera : (m,) of the parts of `FieldEquations`.
+    """
+    u = system.unknowns
     n, s, k = len(u.images), len(u.shared), 2 * len(camera) * nodes.count
     parts = [
         _kernels.FieldSums(
@@ -162,24 +196,20 @@ def field_equations(system: NormalSystem, solution: Solution, factor: Factor, cl
     problem = system.problem(solution.state, solution.estimator)
     system.over_chunks(lambda c: _kernels.field_sides(*system.chunks[c], problem, nodes, parts[c], system.work()))
     images, shared, own, scores = (np.sum([part[axis] for part in parts], axis=0) for axis in range(4))
-    sides = np.concatenate([images.reshape(6 * n, k), shared])
-    half = factor.half_solve(sides)
-    normals = own - half.T @ half
-    return FieldEquations(nodes, camera, sides, 0.5 * (normals + normals.T), scores)
+    return np.concatenate([images.reshape(6 * n, k), shared]), own, scores
 
 
-def _by_camera(system: NormalSystem, clusters: Clusters) -> tuple[np.ndarray, np.ndarray]:
-    """Clusters divided by camera: (n,) number of every photograph's part, (m,) camera of every part."""
-    camera = system.unknowns.block.images.camera[system.unknowns.images]
+def by_camera(clusters: Clusters, camera: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Clusters divided by camera, (n,): (n,) number of every photograph's part, (m,) camera of every part."""
     pairs, label = np.unique(np.column_stack([clusters.label, camera]), axis=0, return_inverse=True)
     return label.ravel().astype(np.int64), pairs[:, 1]
 
 
-def _nodes(system: NormalSystem, label: np.ndarray) -> _kernels.Nodes:
+def nodes_of(system: NormalSystem, label: np.ndarray) -> _kernels.Nodes:
     """The rays among the nodes of their photograph's format, photographs with labels (n,)."""
     u, block = system.unknowns, system.unknowns.block
     half = np.array([camera.half_format_mm for camera in block.cameras])[block.images.camera[u.images]][u.rays.image]
-    number = np.array(_counts(system))
+    number = np.array(_counts(block.cameras))
     at = np.clip(0.5 * (u.rays.xy / half + 1.0), 0.0, 1.0) * (number - 1)
     low = np.minimum(at.astype(np.int64), number - 2)
     x, y = (at - low).T
@@ -188,41 +218,60 @@ def _nodes(system: NormalSystem, label: np.ndarray) -> _kernels.Nodes:
     return _kernels.Nodes(node, weight, label, int(number.prod()))
 
 
-def _counts(system: NormalSystem) -> tuple[int, int]:
+def _counts(cameras: Sequence[Camera]) -> tuple[int, int]:
     """Nodes along x and y."""
-    half = _half_format(system)
+    half = _half_format(cameras)
     return NODES if half[0] >= half[1] else (NODES[1], NODES[0])
 
 
-def _half_format(system: NormalSystem) -> np.ndarray:
+def _half_format(cameras: Sequence[Camera]) -> np.ndarray:
     """(2,) mm, of the largest camera."""
-    return np.max([camera.half_format_mm for camera in system.unknowns.block.cameras], axis=0)
+    return np.max([camera.half_format_mm for camera in cameras], axis=0)
 
 
-def _correlations(system: NormalSystem, length: float, smooth: bool) -> np.ndarray:
+def _correlations(cameras: Sequence[Camera], length: float, smooth: bool) -> np.ndarray:
     """(nodes, nodes) R for a length in mm."""
-    axes = [half * np.linspace(-1.0, 1.0, k) for half, k in zip(_half_format(system), _counts(system), strict=True)]
+    axes = [half * np.linspace(-1.0, 1.0, k) for half, k in zip(_half_format(cameras), _counts(cameras), strict=True)]
     xy = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     squares = np.sum((xy[:, None] - xy) ** 2, axis=2) / length**2
     return np.exp(-0.5 * squares) if smooth else np.exp(-np.sqrt(squares))
 
 
-def _fitted(system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters, sigma0: float) -> Field:
-    """The field with the greatest restricted likelihood."""
-    found = field_equations(system, solution, factor, clusters)
-    normals, scores = found.normals, found.scores
-    if len(clusters) > 1:
-        normals, scores = _without_common(normals, scores, found.camera)
+def fitted_field(system: NormalSystem, solution: Solution, factor: Factor, sigma0: float, clusters: Clusters) -> Field:
+    """The field of clusters with the greatest restricted likelihood.
+
+    Parameters
+    ----------
+    factor : undamped, at the solution.
+    """
+    found, u = field_equations(system, solution, factor, clusters), system.unknowns
+    unit = float(np.median(1.0 / u.rays.inv_sigma))
+    return fit_field(found.normals, found.scores, found.camera, len(clusters) > 1, u.block.cameras, unit, sigma0)
+
+
+def fit_field(
+    normals: np.ndarray, scores: np.ndarray, camera: np.ndarray, several: bool, cameras: Sequence[Camera], unit: float,
+    sigma0: float,
+) -> Field:  # fmt: skip
+    """The field with the greatest restricted likelihood.
+
+    Parameters
+    ----------
+    normals (k, k), scores (k,), camera (m,) : as in `FieldEquations`. several : whether there are several clusters.
+    unit : mm, median σ of an image coordinate.
+    """
+    if several:
+        normals, scores = _without_common(normals, scores, camera)
     values, vectors = np.linalg.eigh(normals)
     there = values > SAME * values[-1]
     root, freedom = vectors[:, there] * np.sqrt(values[there]), int(there.sum())
     z = (vectors[:, there].T @ scores) / np.sqrt(values[there]) / sigma0
-    unit, half = float(np.median(1.0 / system.unknowns.rays.inv_sigma)), float(np.hypot(*_half_format(system)))
+    nodes, half = len(scores) // (2 * len(camera)), float(np.hypot(*_half_format(cameras)))
     best, sizes = None, (unit * SIZES) ** 2
     for smooth in (False, True):
         for length in LENGTHS:
-            r = _correlations(system, half * length, smooth)
-            spread = root.reshape(2 * len(found.camera), found.nodes.count, -1)
+            r = _correlations(cameras, half * length, smooth)
+            spread = root.reshape(2 * len(camera), nodes, -1)
             power, patterns = np.linalg.eigh(np.einsum("cip,ij,cjq->pq", spread, r, spread, optimize=True) / sigma0**2)
             power, squares = np.maximum(power, 0.0), (patterns.T @ z) ** 2
             grown = sizes[:, None] * power

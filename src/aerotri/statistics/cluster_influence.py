@@ -33,12 +33,14 @@ from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.statistics import _cluster_kernels as _kernels
-from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, sides_of_clusters
+from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, Settled, sides_of_clusters
 from aerotri.statistics.clusters import Clusters, order_by_place
 from aerotri.statistics.covariance import InnerDatum
 
 LOWERED, PLAIN_SHARE = 0.9, 0.493
 """t and a of the power −½, see above."""
+MOST_COLUMNS = 48
+"""Columns of the root of what is known beforehand; of more, so many random sums stand for all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,10 +82,21 @@ def influences(
 
 def _plain_changes(system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters) -> Directions:
     """Q·g_c of every cluster: images (n, 6, m), shared (s, m), points (P, 3, m)."""
+    x = factor.solve(plain_sides(system, solution, clusters))
+    return plain_changes(system, solution, clusters, x)
+
+
+def plain_sides(system: NormalSystem, solution: Settled, clusters: Clusters) -> np.ndarray:
+    """The scores g_c with the points eliminated, (6·n + s, m)."""
+    u = system.unknowns
+    nothing = Directions(np.zeros((len(u.images), 6, 0)), np.zeros((len(u.shared), 0)), np.zeros((len(u.points), 3, 0)))
+    return sides_of_clusters(system, solution, clusters, nothing)[0]
+
+
+def plain_changes(system: NormalSystem, solution: Settled, clusters: Clusters, x: np.ndarray) -> Directions:
+    """Q·g_c of every cluster from that of photographs and shared parameters, x (6·n + s, m)."""
     u, m = system.unknowns, len(clusters)
-    n, s, count = len(u.images), len(u.shared), len(u.points)
-    nothing = Directions(np.zeros((n, 6, 0)), np.zeros((s, 0)), np.zeros((count, 3, 0)))
-    x = factor.solve(sides_of_clusters(system, solution, clusters, nothing)[0])
+    n, count = len(u.images), len(u.points)
     images, shared, points = x[: 6 * n].reshape(n, 6, m) * u.eo_free[:, :, None], x[6 * n :], np.empty((count, 3, m))
     label, problem = clusters.label.astype(np.int64), system.problem(solution.state, solution.estimator)
     at_once = int(np.clip(NUMBERS_AT_ONCE / (3 * max(count, 1)), 1, m))
@@ -123,7 +136,7 @@ def _with_lower_weights(
 
 
 def known_part(
-    system: NormalSystem, solution: Solution, factor: Factor, most: int = 48, inner: InnerDatum | None = None
+    system: NormalSystem, solution: Solution, factor: Factor, most: int = MOST_COLUMNS, inner: InnerDatum | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Q·N_0·Q of photographs (n, 6, 6), shared parameters (s, s) and points (P, 3, 3).
 
@@ -141,10 +154,7 @@ def known_part(
     order = order_by_place(solution.state.points[rows])
     rows, axes = rows[order], axes[order]
     root = system.priors.root()
-    of_points, size = np.sqrt(u.prior_weight[rows, axes]), len(rows) + root.shape[1]
-    mix = np.eye(size)
-    if size > most:
-        mix = np.random.default_rng(size).choice([-1.0, 1.0], (size, most)) / np.sqrt(most)
+    of_points, mix = np.sqrt(u.prior_weight[rows, axes]), mixed_columns(len(rows) + root.shape[1], most)
     images, shared, points = np.zeros((n, 6, 6)), np.zeros((s, s)), np.zeros((count, 3, 3))
     at_once = int(np.clip(NUMBERS_AT_ONCE / (3 * max(count, 1)), 1, max(mix.shape[1], 1)))
     for first in range(0, mix.shape[1], at_once):
@@ -157,3 +167,10 @@ def known_part(
         shared += of_shared @ of_shared.T
         points += at_points @ np.swapaxes(at_points, 1, 2)
     return images * (u.eo_free[:, :, None] & u.eo_free[:, None, :]), shared, points
+
+
+def mixed_columns(size: int, most: int = MOST_COLUMNS) -> np.ndarray:
+    """(size, k) sums over `size` columns of a root: the columns themselves, or random sums with signs of many."""
+    if size <= most:
+        return np.eye(size)
+    return np.random.default_rng(size).choice([-1.0, 1.0], (size, most)) / np.sqrt(most)

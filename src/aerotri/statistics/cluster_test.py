@@ -19,7 +19,10 @@ test. The scheme "photograph" is a random division itself, and stands for errors
 
 from __future__ import annotations
 
+import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -27,8 +30,10 @@ from aerotri.adjustment.datum import motions_of_points
 from aerotri.adjustment.kernel_records import Directions
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.point_sides import expand_sides, solve_sides
+from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.adjustment.unknowns import State, Unknowns
 from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.quantiles import chi_square_exceedance, f_exceedance
 from aerotri.results.model_part import ClusterTest
@@ -52,7 +57,9 @@ SAMPLE = 12
 NUMBERS_AT_ONCE = 2e7
 """Numbers of the right sides that are solved together [C]: 160 MB, of which three copies are made."""
 SAMPLED_FROM = 5000
-"""Object points among which those of the sample are looked for."""
+"""Object points among which those of the sample are looked for, where there are twice as many."""
+FEWEST_RAYS = 3
+"""Rays of a point of the sample, where there are such points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +76,20 @@ class Modes:
     products: np.ndarray
 
 
+class Settled(Protocol):
+    """Where an adjustment ended."""
+
+    @property
+    def state(self) -> State: ...
+
+    @property
+    def estimator(self) -> Estimator: ...
+
+
+Squares = Callable[[Clusters], tuple[float, int]]
+"""Gives of clusters uᵀ·K⁺·u and the rank of K."""
+
+
 def weakest_modes(system: NormalSystem, solution: Solution, factor: Factor) -> Modes:
     """The directions of the weakest deformations and the photographs' pulls along them.
 
@@ -77,7 +98,10 @@ def weakest_modes(system: NormalSystem, solution: Solution, factor: Factor) -> M
     factor : undamped, at the solution.
     """
     u = system.unknowns
-    rows = _spread(solution.state.points, np.diff(u.rays.start), ~u.point_held.any(axis=1) & (u.kept < 0))
+    rows = candidates(u)
+    rows = rows[np.diff(u.rays.start)[rows] >= min(FEWEST_RAYS, int(np.diff(u.rays.start).max(initial=0)))]
+    rows = rows[thinned(u.block.points[u.points[rows]])]
+    rows = rows[spread(solution.state.points[rows, :2])]
     size = 3 * len(rows)
     q, own = np.zeros((size, size)), np.zeros((size, size))
     observed = np.flatnonzero((u.prior_weight > 0.0).any(axis=1) & (u.kept < 0))
@@ -95,14 +119,19 @@ def weakest_modes(system: NormalSystem, solution: Solution, factor: Factor) -> M
     at_priors = system.priors.root().T @ at_shared
     own += at_priors.T @ at_priors
     estimable = _estimable(system, solution, rows)
-    values, vectors = np.linalg.eigh(estimable @ (0.5 * (q + q.T) - own) @ estimable)
-    chosen = vectors[:, ::-1][:, :MODES] / np.sqrt(np.maximum(values[::-1][:MODES], 1e-12 * values[-1]))
+    chosen = weakest(estimable @ (0.5 * (q + q.T) - own) @ estimable)
     sides = np.zeros((len(u.points), 3, chosen.shape[1]))
     sides[rows] = chosen.reshape(len(rows), 3, -1)
     # only the sample has sides, so that no other point has to be looked at before the solution
     images, shared, _ = solve_sides(system, solution.state, factor, sides, solution.estimator, rows=rows)
     points = expand_sides(system, solution.state, images, shared, sides, solution.estimator)
     return _with_scores(system, solution, Directions(images, shared, points))
+
+
+def weakest(covariance: np.ndarray) -> np.ndarray:
+    """(size, k) directions of the largest eigenvalues of a covariance, scaled to a variance of 1."""
+    values, vectors = np.linalg.eigh(covariance)
+    return vectors[:, ::-1][:, :MODES] / np.sqrt(np.maximum(values[::-1][:MODES], 1e-12 * values[-1]))
 
 
 def _estimable(system: NormalSystem, solution: Solution, rows: np.ndarray) -> np.ndarray:
@@ -115,22 +144,39 @@ def _estimable(system: NormalSystem, solution: Solution, rows: np.ndarray) -> np
     return np.eye(size) - moved @ np.linalg.pinv(moved)
 
 
-def _spread(points: np.ndarray, rays: np.ndarray, usable: np.ndarray) -> np.ndarray:
-    """Rows of well measured points far from one another in plan."""
-    candidates = np.flatnonzero(usable & (rays >= min(3, int(rays.max(initial=0)))))
-    step = max(len(candidates) // SAMPLED_FROM, 1)
-    candidates = candidates[::step]
-    xy = points[candidates, :2]
+def candidates(unknowns: Unknowns) -> np.ndarray:
+    """Rows of the points that may stand for the shape of the block: adjusted, nothing of them held."""
+    return np.flatnonzero(~unknowns.point_held.any(axis=1) & (unknowns.kept < 0))
+
+
+def thinned(names: np.ndarray) -> np.ndarray:
+    """Rows of the points, (k,) names, that the sample is taken from: some by their names, whatever their order."""
+    if len(names) <= 2 * SAMPLED_FROM:
+        return np.arange(len(names))
+    return np.lexsort((names, keys(names)))[:SAMPLED_FROM]
+
+
+def keys(names: np.ndarray) -> np.ndarray:
+    """(k,) numbers that names are thinned by."""
+    return np.array([zlib.crc32(name.encode()) for name in names.tolist()], dtype=np.int64)
+
+
+def spread(xy: np.ndarray) -> np.ndarray:
+    """Rows of points (k, 2) far from one another in plan, the first in the middle."""
     chosen = [int(np.argmin(np.linalg.norm(xy - np.median(xy, axis=0), axis=1)))]
     apart = np.linalg.norm(xy - xy[chosen[0]], axis=1)
-    # half of them, so that no sample is full of points that stick out
-    for _ in range(min(SAMPLE, len(candidates)) - 1):
+    for _ in range(min(SAMPLE, len(xy)) - 1):
         chosen.append(int(np.argmax(apart)))
         apart = np.minimum(apart, np.linalg.norm(xy - xy[chosen[-1]], axis=1))
-    return candidates[np.array(chosen)]
+    return np.array(chosen)
 
 
 def _with_scores(system: NormalSystem, solution: Solution, y: Directions) -> Modes:
+    return Modes(y, *scores_along(system, solution, y))
+
+
+def scores_along(system: NormalSystem, solution: Settled, y: Directions) -> tuple[np.ndarray, np.ndarray]:
+    """Scores (n, k) and products (n, k, k) of the photographs along directions, see `Modes`."""
     n, k = len(system.unknowns.images), y.images.shape[2]
     parts = [_kernels.Scores(np.zeros((n, k)), np.zeros((n, k, k))) for _ in system.chunks]
     problem = system.problem(solution.state, solution.estimator)
@@ -140,7 +186,7 @@ def _with_scores(system: NormalSystem, solution: Solution, y: Directions) -> Mod
         own, value = along(rows, y)
         np.add.at(scores, rows.image[own], np.einsum("gkf,gk->gf", value, rows.gap[own]))
         np.add.at(products, rows.image[own], np.einsum("gkf,gkh->gfh", value, value))
-    return Modes(y, scores, products)
+    return scores, products
 
 
 def along(rows: Rows, y: Directions) -> tuple[np.ndarray, np.ndarray]:
@@ -155,7 +201,7 @@ def along(rows: Rows, y: Directions) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sides_of_clusters(
-    system: NormalSystem, solution: Solution, clusters: Clusters, y: Directions
+    system: NormalSystem, solution: Settled, clusters: Clusters, y: Directions
 ) -> tuple[np.ndarray, np.ndarray]:
     """A_cᵀP·A·y of every cluster and direction with the points eliminated (6·n + s, m·k), and what points take, (m·k)².
 
@@ -186,22 +232,21 @@ def sides_of_clusters(
 
 
 def compare_clusters(
-    system: NormalSystem, solution: Solution, factor: Factor, modes: Modes, clusters: Clusters, sigma0: float,
-    level: float,
-) -> ClusterTest:  # fmt: skip
+    squares: Squares, clusters: Clusters, centre: np.ndarray, sigma0: float, level: float
+) -> ClusterTest:
     """The test of one scheme.
 
     Parameters
     ----------
-    factor : undamped, at the solution. level : below which the probability by white noise has to be for the scheme to
-        count; ATTRIBUTED that by random divisions.
+    centre : (n, 3) m, of the photographs. level : below which the probability by white noise has to be for the scheme
+        to count; ATTRIBUTED that by random divisions.
     """
     reason = untestable(clusters)
     if reason:
         return ClusterTest(clusters.scheme, len(clusters), reason=reason)
-    clusters = to_test(clusters, solution.state.centre)
+    clusters = to_test(clusters, centre)
     m = len(clusters)
-    found, freedom = sum_of_squares(system, solution, factor, modes, clusters)
+    found, freedom = squares(clusters)
     if freedom == 0:
         return ClusterTest(clusters.scheme, m, reason="nothing checks the clusters against one another")
     p_noise, ratio = chi_square_exceedance(found / sigma0**2, freedom), float(np.sqrt(found / freedom)) / sigma0
@@ -210,21 +255,18 @@ def compare_clusters(
     if p_noise >= level:
         # whatever random divisions show, the scheme does not count; they take most of the time
         return ClusterTest(clusters.scheme, m, freedom, ratio, p_noise=p_noise)
-    of_random = _by_random_divisions(system, solution, factor, modes, clusters)
+    of_random = _by_random_divisions(squares, clusters, centre)
     ratio_random = float(np.sqrt(of_random[0] / of_random[1])) / sigma0
     p_random = f_exceedance((ratio / max(ratio_random, 1.0)) ** 2, freedom, of_random[1])
     counts = p_noise < level and p_random < ATTRIBUTED
     return ClusterTest(clusters.scheme, m, freedom, ratio, ratio_random, p_noise, p_random, counts)
 
 
-def _by_random_divisions(
-    system: NormalSystem, solution: Solution, factor: Factor, modes: Modes, clusters: Clusters
-) -> tuple[float, int]:
+def _by_random_divisions(squares: Squares, clusters: Clusters, centre: np.ndarray) -> tuple[float, int]:
     """Sum of squares and degrees of freedom of random divisions into clusters of the same sizes."""
     rng, total, freedom = np.random.default_rng(len(clusters.label)), 0.0, 0
     for _ in range(DIVISIONS):
-        other = replace(clusters, label=divided_at_random(solution.state.centre, clusters.label, rng))
-        found, own = sum_of_squares(system, solution, factor, modes, other)
+        found, own = squares(replace(clusters, label=divided_at_random(centre, clusters.label, rng)))
         total, freedom = total + found, freedom + own
     return total, max(freedom, 1)
 
@@ -243,15 +285,26 @@ def sum_of_squares(
     system: NormalSystem, solution: Solution, factor: Factor, modes: Modes, clusters: Clusters
 ) -> tuple[float, int]:
     """uᵀ·K⁺·u and the rank of K."""
-    m, k = len(clusters), modes.scores.shape[1]
     sides, taken = sides_of_clusters(system, solution, clusters, modes.y)
     half = factor.half_solve(sides)
-    covariance, pulls = -(taken + half.T @ half), np.zeros((m, k))
+    own, pulls = sums_of_clusters(modes, clusters)
+    return squares_of(own - taken - half.T @ half, pulls)
+
+
+def sums_of_clusters(modes: Modes, clusters: Clusters) -> tuple[np.ndarray, np.ndarray]:
+    """Of the photographs of every cluster along the k modes: yᵀN_c·y on the diagonal of (m·k, m·k), yᵀg_c (m·k,)."""
+    m, k = len(clusters), modes.scores.shape[1]
+    products, pulls = np.zeros((m * k, m * k)), np.zeros((m, k))
     np.add.at(pulls, clusters.label, modes.scores)
     for c in range(m):
         own = slice(c * k, (c + 1) * k)
-        covariance[own, own] += modes.products[clusters.label == c].sum(axis=0)
+        products[own, own] = modes.products[clusters.label == c].sum(axis=0)
+    return products, pulls.ravel()
+
+
+def squares_of(covariance: np.ndarray, pulls: np.ndarray) -> tuple[float, int]:
+    """uᵀ·K⁺·u and the rank of K from K (k, k) and u (k,)."""
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
     there = values > SAME * values[-1]
-    squares = (vectors[:, there].T @ pulls.ravel()) ** 2 / values[there]
+    squares = (vectors[:, there].T @ pulls) ** 2 / values[there]
     return float(squares.sum()), int(there.sum())

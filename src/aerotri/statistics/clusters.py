@@ -13,7 +13,7 @@ from aerotri.adjustment.track import (
     order_of_exposure,
     strips_of_track,
 )
-from aerotri.adjustment.unknowns import State, Unknowns
+from aerotri.observations import Block
 
 FEWEST = 5
 """Clusters from which a jackknife is made [C]: a variance of four degrees of freedom has a σ of 35 % of itself as a
@@ -56,27 +56,32 @@ class Clusters:
         return len(self.names)
 
 
-def cluster_schemes(unknowns: Unknowns, state: State) -> tuple[Clusters, ...]:
+def cluster_schemes(block: Block, rows: np.ndarray, centre: np.ndarray) -> tuple[Clusters, ...]:
     """Strips, directions of flight, every grouping column of images.csv, cameras and single photographs.
 
     A scheme of one cluster is left out unless the block is one strip, and one that divides the photographs as another
     before it.
+
+    Parameters
+    ----------
+    block : its photographs, cameras and positions are looked at. rows : (n,) photographs that take part.
+    centre : (n, 3) m, adjusted.
     """
-    images, rows = unknowns.block.images, unknowns.images
+    images = block.images
     # the heads of a rig fly one track, not one a head
-    alone, exposure = one_an_exposure(unknowns.block, rows)
-    order = _order_of_exposure(unknowns, state, alone)
-    strip, strip_names = _strips(unknowns, state, alone, order)
+    alone, exposure = one_an_exposure(block, rows)
+    order = _order_of_exposure(block, rows[alone], centre[alone])
+    strip, strip_names = _strips(images.strip[rows[alone]].astype(str), centre[alone], order)
     found = [_limited("strip", strip[exposure], strip_names)]
     way, way_names = np.empty_like(strip), ()
-    way[order], way_names = _directions(state.centre[alone][order], strip[order])
+    way[order], way_names = _directions(centre[alone][order], strip[order])
     found.append(_limited("direction of flight", way[exposure], way_names))
     for name, values in images.columns.items():
         if name in OF_ONE_EXPOSURE:
             continue
         names, label = np.unique(values[rows].astype(str), return_inverse=True)
         found.append(_limited(name, label, tuple(str(n) for n in names)))
-    of_camera = np.array([camera.name for camera in unknowns.block.cameras])[images.camera[rows]]
+    of_camera = np.array([camera.name for camera in block.cameras])[images.camera[rows]]
     cameras, label = np.unique(of_camera, return_inverse=True)
     if len(cameras) >= FEWEST:
         found.append(_limited(CAMERA, label, tuple(cameras.tolist())))
@@ -85,7 +90,7 @@ def cluster_schemes(unknowns: Unknowns, state: State) -> tuple[Clusters, ...]:
         several = 2 <= len(clusters) <= len(rows) // 2 or (clusters.scheme == "strip" and len(clusters) == 1)
         if several and not any(_alike(clusters, other) for other in kept):
             kept.append(clusters)
-    return (*kept, _at_random(state.centre))
+    return (*kept, _at_random(centre))
 
 
 def order_by_place(xyz: np.ndarray) -> np.ndarray:
@@ -122,24 +127,20 @@ def _at_random(centre: np.ndarray, most: int = MOST_AT_RANDOM) -> Clusters:
     return Clusters(PHOTOGRAPH, label, tuple(str(k + 1) for k in range(most)), n)
 
 
-def _order_of_exposure(unknowns: Unknowns, state: State, alone: np.ndarray) -> np.ndarray:
-    """(e,) order in which the photographs `alone` (e,) were taken, whatever the order of their rows."""
-    images, rows = unknowns.block.images, unknowns.images[alone]
-    named = images.strip[rows].astype(str)
+def _order_of_exposure(block: Block, rows: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """(e,) order in which the photographs `rows` (e,) with centres (e, 3) were taken."""
+    named = block.images.strip[rows].astype(str)
     strips = named if all(named.tolist()) else np.full(len(rows), "")
-    return order_of_exposure(state.centre[alone], strips, images.names[rows], exposure_times(unknowns.block)[rows])
+    return order_of_exposure(centre, strips, block.images.names[rows], exposure_times(block)[rows])
 
 
-def _strips(
-    unknowns: Unknowns, state: State, alone: np.ndarray, order: np.ndarray
-) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Strips (e,) of the photographs `alone` and their names in the order of exposure: by name, or found at turns."""
-    named = unknowns.block.images.strip[unknowns.images[alone]].astype(str)
+def _strips(named: np.ndarray, centre: np.ndarray, order: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Strips (e,) of exposures and their names in their order: by name (e,), or found at turns of the centres."""
     if all(named.tolist()):
         names = list(dict.fromkeys(named[order].tolist()))
         return np.array([names.index(name) for name in named]), tuple(names)
-    strip = np.empty(len(alone), dtype=np.int64)
-    strip[order] = strips_of_track(state.centre[alone][order], np.full(len(alone), ""))
+    strip = np.empty(len(named), dtype=np.int64)
+    strip[order] = strips_of_track(centre[order], np.full(len(named), ""))
     return strip, tuple(str(k + 1) for k in range(int(strip.max(initial=-1)) + 1))
 
 

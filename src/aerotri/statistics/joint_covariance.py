@@ -130,10 +130,11 @@ def joint_cofactors(
     if root is not None:
         of_root = np.stack([_taken(chosen[k], axis, root.images, root.shared, root.points) for k, axis in columns])
         model = of_root @ of_root.T
+        noise = np.zeros_like(model)
         if root.noise > 0.0:
             own = known_root_of(system, shared, points)
-            model = model - root.noise * (q - own.T @ own)
-        model = turn @ positive_part(model[None])[0] @ turn.T
+            noise = root.noise * (q - own.T @ own)
+        model = turn @ positive_part(model[None], noise[None])[0] @ turn.T
     q = turn @ q @ turn.T
     return 0.5 * (q + q.T), model
 

@@ -33,6 +33,7 @@ def model_of_functions(
     count = unknowns.shape[1] // size
     along = (root.images.reshape(n, -1).T @ unknowns[:n] + root.shared.T @ unknowns[n:]).reshape(-1, count, size)
     found = np.einsum("mki,mkj->kij", along, along)
+    noise = np.zeros_like(found)
     if root.noise > 0.0:
         both = cofactors
         if both is None:
@@ -40,8 +41,8 @@ def model_of_functions(
                 "uki,ukj->kij", unknowns.reshape(-1, count, size), solved.reshape(-1, count, size), optimize=True
             )
         known = known_root(system, solution, solved).reshape(-1, count, size)
-        found = found - root.noise * (both - np.einsum("mki,mkj->kij", known, known))
-    return positive_part(found)
+        noise = root.noise * (both - np.einsum("mki,mkj->kij", known, known))
+    return positive_part(found, noise)
 
 
 def known_root(system: NormalSystem, solution: Solution, solved: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ clusters passes the test of `cluster_test`.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,20 +16,31 @@ import numpy as np
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.adjustment.unknowns import Unknowns
 from aerotri.quantiles import normal_quantile, student_quantile
+from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.model_part import ClusterTest, ModelPart, ModelRoot
 from aerotri.statistics.cluster_fields import Field, compare_field
 from aerotri.statistics.cluster_influence import influences, known_part
-from aerotri.statistics.cluster_test import LEVEL, compare_clusters, untestable, weakest_modes
-from aerotri.statistics.clusters import CAMERA, LARGE, PHOTOGRAPH, Clusters, cluster_schemes
+from aerotri.statistics.cluster_test import (
+    LEVEL,
+    Settled,
+    Squares,
+    compare_clusters,
+    sum_of_squares,
+    untestable,
+    weakest_modes,
+)
+from aerotri.statistics.clusters import CAMERA, LARGE, PHOTOGRAPH, Clusters
 from aerotri.statistics.covariance import InnerDatum, orientation_cofactors
+from aerotri.statistics.summarise import OF_POINTS
 
 FEWEST_PHOTOGRAPHS = 10
 """Photographs from which clusters are looked for [C]."""
+LEAST_LEFT = 0.1
+"""Share of a variance and of what noise explains of it, that a covariance is scaled by at least [C]."""
 COVERED = 0.95
 """Probability for which the model part of few clusters is widened [C]: what a surveyor quotes."""
-POINTS_AT_ONCE = 4096
-"""Object points whose columns are held in double precision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,55 +59,82 @@ class Excess:
     root: ModelRoot
 
 
-def why_not(system: NormalSystem, solution: Solution, sigma0: float) -> str:
-    """Why a block has no model part from clusters, '' where it can have one."""
-    u = system.unknowns
-    if u.block.settings.adjustment.model_part == "off":
+def why_not(model_part: str, photographs: int, status: str, sigma0: float) -> str:
+    """Why a block has no model part from clusters, '' where it can have one.
+
+    Parameters
+    ----------
+    model_part : as the settings say. status : of the adjustment.
+    """
+    if model_part == "off":
         return "switched off"
-    if len(u.images) < FEWEST_PHOTOGRAPHS:
+    if photographs < FEWEST_PHOTOGRAPHS:
         return f"there are fewer than {FEWEST_PHOTOGRAPHS} photographs"
-    if solution.status != "converged" or not sigma0 > 0.0:
+    if status != "converged" or not sigma0 > 0.0:
         return "the adjustment has no final σ0"
     return ""
 
 
 def compare_schemes(
-    system: NormalSystem, solution: Solution, factor: Factor, sigma0: float
-) -> tuple[tuple[Clusters, ...], tuple[ClusterTest, ...]]:
-    """All ways to divide the photographs, and their tests, at LEVEL together (Bonferroni).
+    schemes: Sequence[Clusters], centre: np.ndarray, sigma0: float, prepare: Callable[[], Squares]
+) -> tuple[ClusterTest, ...]:
+    """Tests of all ways to divide the photographs, at LEVEL together (Bonferroni).
+
+    Parameters
+    ----------
+    centre : (n, 3) m, of the photographs. prepare : gives what sums of squares are computed by, where they are needed.
+    """
+    tested = sum(not untestable(clusters) for clusters in schemes)
+    if not tested:
+        return tuple(ClusterTest(c.scheme, len(c), reason=untestable(c)) for c in schemes)
+    squares = prepare()
+    return tuple(compare_clusters(squares, clusters, centre, sigma0, LEVEL / tested) for clusters in schemes)
+
+
+def squares_by(system: NormalSystem, solution: Solution, factor: Factor) -> Squares:
+    """The sums of squares of clusters along the weakest modes of a block.
 
     Parameters
     ----------
     factor : undamped, at the solution.
     """
-    schemes = cluster_schemes(system.unknowns, solution.state)
-    tested = sum(not untestable(clusters) for clusters in schemes)
-    if not tested:
-        return schemes, tuple(ClusterTest(c.scheme, len(c), reason=untestable(c)) for c in schemes)
     modes = weakest_modes(system, solution, factor)
-    return schemes, tuple(
-        compare_clusters(system, solution, factor, modes, clusters, sigma0, LEVEL / tested) for clusters in schemes
-    )
+    return lambda clusters: sum_of_squares(system, solution, factor, modes, clusters)
 
 
 def compare_few(
-    system: NormalSystem, solution: Solution, factor: Factor, schemes: tuple[Clusters, ...],
-    tests: tuple[ClusterTest, ...], sigma0: float,
+    schemes: Sequence[Clusters], tests: tuple[ClusterTest, ...], centre: np.ndarray,
+    fitted: Callable[[Clusters], Field],
 ) -> tuple[tuple[ClusterTest, ...], dict[int, Field]]:  # fmt: skip
     """Schemes of too few clusters tested by random fields, where no scheme of strips, days … could be tested otherwise.
+
+    Parameters
+    ----------
+    centre : (n, 3) m, of the photographs. fitted : gives the random field that fits clusters best.
 
     Returns
     -------
     the tests, and the fields by the number of their scheme.
     """
     several = [k for k, one in enumerate(schemes) if one.scheme not in (CAMERA, PHOTOGRAPH)]
-    if any(not tests[k].reason for k in several) or len(system.unknowns.images) > LARGE:
+    if any(not tests[k].reason for k in several) or len(centre) > LARGE:
         return tests, {}
-    found = {
-        k: compare_field(system, solution, factor, schemes[k], sigma0, LEVEL / len(several)) for k in several
-    }  # fmt: skip
+    found = {k: compare_field(fitted, schemes[k], centre, LEVEL / len(several)) for k in several}
     compared = tuple(found[k][0] if k in found else test for k, test in enumerate(tests))
     return compared, {k: field for k, (_, field) in found.items()}
+
+
+def chosen_scheme(tests: Sequence[ClusterTest]) -> int | None:
+    """The number of the scheme with the largest ratio of those that count; single photographs where no other does."""
+    counting = [(test.scheme != PHOTOGRAPH, test.ratio, k) for k, test in enumerate(tests) if test.counts]
+    return max(counting)[2] if counting else None
+
+
+def why_none(tests: Sequence[ClusterTest]) -> str:
+    """Why no scheme counts."""
+    if tests and all(test.reason for test in tests):
+        return tests[0].reason
+    return "no group of photographs has errors that noise does not explain"
 
 
 def excess_of_clusters(
@@ -119,18 +158,23 @@ def excess_of_clusters(
         widening * sigma0**2,
     )  # fmt: skip
     points = np.zeros_like(q_points)
-    # as of a variance of m values about their mean [L]; it makes good for what only one cluster determines
-    freedom = widening * m / (m - 1)
+    freedom = freedom_of(m)
     for c, change in enumerate(influences(system, solution, factor, clusters)):
         columns = tuple(part[..., None] for part in change)
         columns = columns if inner is None else inner.moved(*columns)
         for into, values in zip((root.images, root.shared, root.points), columns, strict=True):
             into[..., c : c + 1] = np.sqrt(freedom) * values
         points += columns[2] @ np.swapaxes(columns[2], 1, 2)
-    images = positive_part(root.images @ np.swapaxes(root.images, 1, 2) - root.noise * noise[0])
-    shared = positive_part((root.shared @ root.shared.T - root.noise * noise[1])[None])[0]
-    points = positive_part(freedom * points - root.noise * noise[2])
+    images = positive_part(root.images @ np.swapaxes(root.images, 1, 2), root.noise * noise[0])
+    shared = positive_part((root.shared @ root.shared.T)[None], root.noise * noise[1][None])[0]
+    points = positive_part(freedom * points, root.noise * noise[2])
     return Excess(orientation_cofactors(system.unknowns, solution.state, images), shared, points, root)
+
+
+def freedom_of(clusters: int) -> float:
+    """What the sum over so many clusters is multiplied with."""
+    # as of a variance of m values about their mean [L]; it makes good for what only one cluster determines
+    return of_few(clusters) * clusters / (clusters - 1)
 
 
 def of_few(clusters: int) -> float:
@@ -143,35 +187,67 @@ def of_few(clusters: int) -> float:
     return (student_quantile(upper, clusters - 1) / normal_quantile(upper)) ** 2
 
 
-def excess_of_root(system: NormalSystem, solution: Solution, root: ModelRoot) -> Excess:
-    """The model part F·Fᵀ of a root that has no noise in it."""
+def excess_of_root(system: NormalSystem, solution: Settled, root: ModelRoot, points: np.ndarray) -> Excess:
+    """The model part F·Fᵀ of a root that has no noise in it, of the points given (P, 3, 3)."""
     images = root.images @ np.swapaxes(root.images, 1, 2)
-    points = np.empty((len(root.points), 3, 3))
-    for first in range(0, len(points), POINTS_AT_ONCE):
-        own = root.points[first : first + POINTS_AT_ONCE].astype(float)
-        points[first : first + POINTS_AT_ONCE] = own @ np.swapaxes(own, 1, 2)
     shared = root.shared @ root.shared.T
     return Excess(orientation_cofactors(system.unknowns, solution.state, images), shared, points, root)
 
 
-def positive_part(covariance: np.ndarray) -> np.ndarray:
-    """(k, d, d) symmetric matrices without their negative eigenvalues, each scaled to its own diagonal first."""
-    scale = np.sqrt(np.abs(np.diagonal(covariance, axis1=1, axis2=2)))
+def positive_part(covariance: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Covariances less what noise explains of them, (k, d, d) both, without negative eigenvalues.
+
+    Each is scaled to its own diagonal first, or to a share of both where little of the diagonal is left: scaled to
+    nothing, the other variances would grow without bound.
+    """
+    rest = covariance - noise
+    left, both = (
+        np.abs(np.diagonal(part, axis1=1, axis2=2)) for part in (rest, np.abs(covariance) + np.abs(noise))
+    )  # fmt: skip
+    scale = np.sqrt(np.maximum(left, LEAST_LEFT * both))
     scale = np.where(scale > 0.0, scale, 1.0)
-    values, vectors = np.linalg.eigh(covariance / (scale[:, :, None] * scale[:, None, :]))
+    values, vectors = np.linalg.eigh(rest / (scale[:, :, None] * scale[:, None, :]))
     kept = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
     return kept * scale[:, :, None] * scale[:, None, :]
 
 
-def with_ratios(part: ModelPart, sigma: np.ndarray, model: np.ndarray) -> ModelPart:
-    """The record with the medians of σ total over σ of the object points.
+def spread_over_block(
+    unknowns: Unknowns, local: AdjustedBlock, images: np.ndarray, shared: np.ndarray, points: np.ndarray
+) -> AdjustedBlock:
+    """The local result with the model part in the rows of the block.
 
     Parameters
     ----------
-    sigma, model : (N, 3) m, σ of the points and its model part.
+    images (n, 6, 6), shared (s, s), points (P, 3, 3) : as in `Excess`.
     """
+    u = unknowns
+    of_points, of_images = np.full_like(local.points.covariance, np.nan), np.full_like(local.images.covariance, np.nan)
+    of_points[u.points], of_images[u.images] = points, images
+    return replace(
+        local,
+        points=replace(local.points, model=of_points),
+        images=replace(local.images, model=of_images),
+        parameters=replace(local.parameters, model=of_parameters(u.shared.kinds, shared, len(local.parameters))),
+    )
+
+
+def of_parameters(kinds: Sequence[str], shared: np.ndarray, count: int) -> np.ndarray:
+    """(count, count) model part of the parameters that are told, from that of all shared ones (s, s)."""
+    own = np.flatnonzero(~np.isin(np.array(kinds, dtype=object).astype(str), OF_POINTS))
+    model = np.zeros((count, count))
+    model[: len(own), : len(own)] = shared[np.ix_(own, own)]
+    return model
+
+
+def growth_of(covariance: np.ndarray, model: np.ndarray) -> np.ndarray:
+    """(N, 3) σ total over σ of points, from their covariance and its model part (N, 3, 3)."""
+    sigma, of_model = (np.sqrt(np.diagonal(part, axis1=1, axis2=2)) for part in (covariance, model))
     with np.errstate(divide="ignore", invalid="ignore"):
-        growth = np.sqrt(sigma**2 + model**2) / sigma
+        return np.sqrt(sigma**2 + of_model**2) / sigma
+
+
+def with_ratios(part: ModelPart, growth: np.ndarray) -> ModelPart:
+    """The record with the medians of σ total over σ of the object points, (N, 3)."""
     known = np.isfinite(growth).all(axis=1)
     if not known.any():
         return part

@@ -27,7 +27,7 @@ def names_of_strips(prepared: Prepared) -> np.ndarray | None:
     if all(images.strip.astype(str).tolist()):
         return images.strip
     names = np.full(len(images), "", dtype=object)
-    for clusters in cluster_schemes(u, prepared.state):
+    for clusters in cluster_schemes(u.block, u.images, prepared.state.centre):
         if clusters.scheme == "strip" and clusters.joined == len(clusters):
             names[u.images] = [f"strip {k + 1}" for k in clusters.label]
     return names if all(names.tolist()) else None

@@ -38,7 +38,7 @@ def divisions_of(unknowns: Unknowns, state: State) -> Divisions:
         return Divisions((), ())
     found = areas(unknowns.block, unknowns.images, state.centre, count)
     strips: list[np.ndarray] = []
-    for clusters in cluster_schemes(unknowns, state):
+    for clusters in cluster_schemes(unknowns.block, unknowns.images, state.centre):
         if clusters.scheme == "strip":
             rank = ranks_of(unknowns.block).image
             strips = [unknowns.images[clusters.label == k] for k in range(len(clusters))]

@@ -210,7 +210,6 @@ def page_content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], bes
         "elsewhere_notes": elsewhere_notes,
         "free": None if beside.free_check is None else _free_check(beside.free_check),
         "crosscheck": None if beside.crosscheck is None else _crosscheck(beside.crosscheck),
-        "first": [],
         "sampled": "",
     }
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from aerotri.partition.whole import NO_MODEL_PART, Whole
+from aerotri.partition.whole import Whole
 from aerotri.report.pages.adjustment import Findings, filled_page, page_content
 from aerotri.report.plots.overview import all_plots
 from aerotri.report.plots.rendering import RenderedPlot, render_plots
@@ -55,7 +55,6 @@ def parts_html(whole: Whole, plots: Mapping[str, Figure | RenderedPlot]) -> str:
         "images": tables.images(everything),
         "photograph_residuals": photograph_tables.photograph_residuals_table(picture.residuals, everything),
     }
-    content["first"] = [text for text in record.outcome.warnings if text.startswith(NO_MODEL_PART)]
     content["sampled"] = _sampled(whole, drawn)
     return filled_page(content)
 
@@ -69,6 +68,8 @@ def parts_table(whole: Whole) -> Table:
     """The parts side by side; every number is of all rays of the part."""
     rows = whole.picture.parts
     digits = metre_digits(np.array([row.sigma for row in rows]))
+    model = whole.record.model_part
+    total = "total " if model is not None and model.counts else ""
     return table(
         "The parts",
         (Column("part"), [row.name for row in rows]),
@@ -80,7 +81,7 @@ def parts_table(whole: Whole) -> Table:
         (Column("largest |w|", "", ".1f"), [row.largest_w for row in rows]),
         (Column("rays beyond the test", "", "d"), [row.beyond for row in rows]),
         *(
-            (Column(f"σ{axis}, median", "m", f".{digits}f"), [row.sigma[k] for row in rows])
+            (Column(f"{total}σ{axis}, median", "m", f".{digits}f"), [row.sigma[k] for row in rows])
             for k, axis in enumerate("XYZ")
         ),
     )
@@ -143,7 +144,7 @@ def _drawn(whole: Whole) -> tuple[AdjustedBlock, np.ndarray]:
         block=block,
         images=replace(
             found, centre=found.centre[rows], angles=found.angles[rows], covariance=found.covariance[rows],
-            rays=found.rays[rows],
+            rays=found.rays[rows], model=None if found.model is None else found.model[rows],
         ),
         rays=replace(results, **{key: getattr(results, key)[own] for key in keys}),
     ), rows  # fmt: skip
