@@ -195,6 +195,8 @@ class _PartsModel:
         root = self._course.common.priors.root()
         places = np.concatenate(observed)
         mix = mixed_columns(len(places) + root.shape[1])
+        if not mix.shape[1]:  # nothing is known beforehand: one column of nothing
+            mix = np.zeros((0, 1))
         # the random sums are to be the same for any order of the points
         of_places = np.empty((len(places), mix.shape[1]))
         of_places[order_by_place(places)] = mix[: len(places)]

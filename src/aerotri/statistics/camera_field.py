@@ -155,7 +155,7 @@ def _most_likely(found: Adjustment, equations: FieldEquations, squares: float) -
     sizes = (unit * SIZES) ** 2
     best = (0.0, 0.0, squares / redundancy, half)
     for length in half * np.array(LENGTHS):
-        r = correlations(u.block.cameras, length, True)
+        r = correlations(cameras, length, True)
         power, patterns = np.linalg.eigh(np.einsum("cip,ij,cjq->pq", spread, r, spread, optimize=True))
         grown = sizes[:, None] * np.maximum(power, 0.0)
         explained = np.sum((patterns.T @ z) ** 2 * grown / (1.0 + grown), axis=1)
