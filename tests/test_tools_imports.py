@@ -36,6 +36,7 @@ INSIDE = {
     "prove/moving/cases.py": "the strips of a track, as an adjustment finds them",
     "prove/moving/flights.py": "the strips of a track, as an adjustment finds them",
     "prove/metamorphic_photographs.py": "the first orientation in orders that no file gives",
+    "prove/ortho_adjustment.py": "the adjustment's part of σ of an orthophoto, where details are displaced",
     "prove/ortho_sigma.py": "σ of an orthophoto by its parts, where details are displaced",
     "prove/parts.py": "lets an adjustment go on until only rounding is left",
     "prove/parts_scale.py": "the fronts that the tree lets expect, beside the memory that is measured",

@@ -187,6 +187,44 @@ def test_change_certificate(measured, tmp_path):
     assert abs(whole["net_m3"] - np.pi * 25.0**2) < 3.0 * whole["sigma_net_m3"]
 
 
+@pytest.fixture(scope="module")
+def clouds(result, tmp_path_factory):
+    """Folder of a change of two clouds, a third of which was raised, with stable ground on the rest."""
+    place = tmp_path_factory.mktemp("clouds")
+    rng = np.random.default_rng(3)
+    before, after = (
+        np.column_stack([rng.uniform(0.0, 60.0, (20000, 2)), rng.normal(0.0, 0.02, 20000)]) for _ in range(2)
+    )
+    after[:, 2] += np.where(after[:, 0] < 20.0, 0.5, 0.0)
+    stable = shapely.box(25.0, 0.0, 60.0, 60.0)
+    return aerotri.cloud_change(before, after, stable=stable, project=result).save(place / "change")
+
+
+def test_certificate_of_a_change_of_clouds(clouds, tmp_path):
+    content = json.loads((clouds / "cloud_change.json").read_text())
+    for language, decimal, words in (
+        ("en", ".", ("Change certificate", "Gained", "cylinder", "stable ground")),
+        ("de", ",", ("Änderungsbescheinigung", "Zugang", "Zylinder", "Gelände")),
+    ):
+        made = aerotri.export(clouds, tmp_path / language, "pdf", language=language)
+        assert made.files == ("change.pdf",)
+        text = text_of(tmp_path / language / "change.pdf")
+        for word in (*words, "Survey GmbH", HOSTILE):
+            assert word in text
+        # a third was raised
+        assert f"{content['gained_percent']:.1f}".replace(".", decimal) + " % " in text
+        assert content["gained_percent"] == pytest.approx(100.0 / 3.0, abs=4.0)
+        # the caption of the histogram
+        assert "logarith" in text
+    assert (clouds / "plots" / "histogram.de.svg").is_file()
+
+
+def test_damaged_change_of_clouds_is_refused(tmp_path):
+    (tmp_path / "cloud_change.json").write_text("{}")
+    with pytest.raises(InputError, match="is damaged"):
+        aerotri.export(tmp_path, tmp_path / "out", "pdf")
+
+
 def test_command_keeps_other_exports(result, tmp_path, capsys):
     out = tmp_path / "out"
     for words in ([], ["--document", "calibration"], ["--language", "de"]):

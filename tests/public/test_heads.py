@@ -98,6 +98,9 @@ def test_volume_and_change_take_it_from_what_they_are_given(result, tmp_path):
         assert json.loads((tmp_path / name / f"{name}.json").read_text())["project"] == PROJECT.as_dict()
         # a result knows its project again, but for the picture
         assert project_of(None, tmp_path / name) == replace(PROJECT, logo="", logo_content=b"")
+    points = np.column_stack([np.random.default_rng(1).uniform(0.0, 10.0, (900, 2)), np.zeros(900)])
+    aerotri.cloud_change(points, points, project=result).save(tmp_path / "clouds", plots=False)
+    assert project_of(None, tmp_path / "clouds") == replace(PROJECT, logo="", logo_content=b"")
     assert compared.summary["project"] == PROJECT.as_dict()
     assert list(compared.summary)[:6] == KEYS
 

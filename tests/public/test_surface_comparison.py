@@ -50,6 +50,38 @@ def test_sigma_of_the_bias_knows_what_neighbours_share(control):
         assert low < np.sum(np.square(z)) < high
 
 
+def test_errors_that_do_not_average_out_count_in_the_bias(tmp_path, control):
+    """Surfaces with errors that fall to 1/e over 12 cells: stated in their file they are in σ of the bias."""
+    from scipy.stats import chi2
+
+    from aerotri.rasters.surface_files import write_surface_parts
+
+    sigma, length = 0.05, 12.0 * CELL
+    x, y = np.meshgrid(control.grid.x(np.arange(120)), control.grid.y(np.arange(100)))
+    some = np.random.default_rng(4).choice(120 * 100, 400, replace=False)
+    place = np.column_stack([x.ravel(), y.ravel()])
+    apart = np.linalg.norm(place[:, None] - place[some], axis=2)
+    known = np.exp(-apart[some] / length)
+    root = np.linalg.cholesky(known + 1e-9 * np.eye(len(some)))
+    by_cell = np.exp(-apart / length) @ np.linalg.inv(known)
+    z = []
+    for seed in range(30):
+        rng = np.random.default_rng([seed, 9])
+        error = sigma * (by_cell @ (root @ rng.normal(size=len(some)))).reshape(x.shape)
+        higher = control.z + error + rng.normal(0.0, 0.02, x.shape)
+        stated = {"SHARED_SIGMA_M": f"{sigma}", "SHARED_LENGTH_M": f"{length}"}
+        parts = iter([(0, 0, higher, np.full_like(higher, 0.06))])
+        write_surface_parts(tmp_path / "dsm.tif", parts, control.grid, "EPSG:32632", "DSM Z, m", stated)
+        found = aerotri.compare(tmp_path / "dsm.tif", control)
+        z.append(found.bias / found.matching_shared)
+        assert found.bias_sigma > found.matching_shared > 0.0
+        assert found.summary["matching_shared_m"] == found.matching_shared
+    low, high = chi2.ppf([0.0005, 0.9995], 30)
+    assert low < np.sum(np.square(z)) < high
+    assert aerotri.compare(raised(control, 0.1), control).matching_shared == 0.0
+    assert aerotri.compare(tmp_path / "dsm.tif", control, align="shift").matching_shared == 0.0
+
+
 def test_a_known_difference(control):
     noise = np.random.default_rng(3).normal(0.3, 0.2, control.z.shape)
     found = aerotri.compare(raised(control, noise), control)

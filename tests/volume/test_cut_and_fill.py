@@ -15,6 +15,7 @@ from aerotri.volume.boundary import boundary_of
 from aerotri.volume.cell_noise import NO_NOISE, CellNoise
 from aerotri.volume.counted import Counted, counted_pieces
 from aerotri.volume.functionals import cell_volume, tin_volume, triangulated
+from aerotri.volume.kinks import lost_on_either_side
 from aerotri.volume.rectified import covariance_above, excess, expected_above, line_of_shared, share_of_variance
 from aerotri.volume.regions import base_over, region_of_cells, region_of_pieces
 from aerotri.volume.roughness import Roughness, ground_of
@@ -188,3 +189,41 @@ def test_region_of_triangles_as_of_cells():
     assert tin.line.moved == pytest.approx(cells.line.moved, rel=0.05)
     np.testing.assert_allclose(tin.weight @ tin.places, cells.weight @ cells.places, rtol=5e-3)
     assert len(KDTree(tin.places).query_pairs(1e-9)) == 0
+
+
+def _random_tin(heights, seed):
+    """Points at chance places over 100 m × 100 m, their triangles, and the areas inside of the middle."""
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform(0.0, 100.0, (2500, 2))
+    xyz = np.column_stack([xy, heights(*xy.T, rng)])
+    triangles = triangulated(xyz)
+    pieces = cut_to(shapely.box(10.0, 10.0, 90.0, 90.0), xyz[triangles][:, :, :2])
+    return xyz, triangles, np.bincount(pieces.triangle, pieces.area, len(triangles))
+
+
+def test_kinks_tell_what_is_lost_at_a_face():
+    """A wall with a level through its middle: straight triangles make a ramp of it, wherever the points lie."""
+    true, lost, told = 3.0 * 40.0 * 80.0, [], []
+    for seed in range(6):
+        xyz, triangles, area = _random_tin(lambda x, y, _: np.where(x + 3.0 * np.sin(y / 7.0) < 50.0, -3.0, 3.0), seed)
+        corners = xyz[triangles]
+        cut, fill = prism_sums(shapely.box(10.0, 10.0, 90.0, 90.0), corners[:, :, :2], corners[:, :, 2])[:2]
+        lost.append(true - 0.5 * (cut + fill))
+        told.append(lost_on_either_side(xyz, triangles, area, Counted(level(0.0), 1), 0.0))
+    assert min(lost) > 0.01 * true
+    assert np.mean(told) == pytest.approx(np.mean(lost), rel=0.2)
+
+
+def test_kinks_of_a_plane_and_of_noise_tell_nothing():
+    """A plane through the level has none; those of noise on level ground are taken off, where its σ is told."""
+    xyz, triangles, area = _random_tin(lambda x, y, _: 0.1 * (x - 50.0), 3)
+    assert abs(lost_on_either_side(xyz, triangles, area, Counted(level(0.0), 1), 0.0)) < 1e-8
+    told = np.zeros(2)
+    for seed in range(6):
+        xyz, triangles, area = _random_tin(lambda x, y, rng: rng.normal(0.0, 0.1, len(x)), seed)
+        told += [lost_on_either_side(xyz, triangles, area, Counted(level(0.0), 1), noise) for noise in (0.01, 0.0)]
+    assert abs(told[0]) < 0.25 * told[1]
+    assert lost_on_either_side(xyz, triangles, area, Counted(level(0.0), -1), 0.01) == pytest.approx(
+        lost_on_either_side(xyz, triangles, area, Counted(level(0.0), 1), 0.01)
+    )
+    assert lost_on_either_side(xyz, triangles, 0.0 * area, Counted(level(0.0), 1), 0.0) == 0.0

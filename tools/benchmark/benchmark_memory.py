@@ -1,8 +1,9 @@
-"""Peak memory of `aerotri dsm` and `aerotri ortho` with photographs of 11500 × 7500 pixels, each in its own process.
+"""Peak memory of `aerotri dsm`, `dtm` and `ortho` with photographs of 11500 × 7500 pixels, each in its own process.
 
-A strip over hilly ground is rendered, 8 bits in three colours, and adjusted. `dsm` measures a square about its middle,
-`ortho` makes the whole of the strip at the GSD, over waves of 10 m that it reads from a file. Peak memory is the
-largest resident set that the system states for the process, the program and the pages of mapped files included.
+A strip over hilly ground is rendered, 8 bits in three colours, and adjusted. `dsm` and `dtm` measure a square about its
+middle, or all of it, `ortho` makes the whole of the strip at the GSD, over waves of 10 m that it reads from a file.
+Peak memory is the largest resident set that the system states for the process, the program and the pages of mapped
+files included.
 
 Measures the commands from within their processes: imports aerotri.cli on purpose, and writes the surface as dsm does.
 
@@ -49,10 +50,10 @@ def main() -> None:
     parser.add_argument("--photographs", type=int, default=4, help="of a strip")
     parser.add_argument("--strips", type=int, default=1)
     parser.add_argument("--size", type=int, nargs=2, default=SIZE, help="columns and rows of a photograph")
-    parser.add_argument("--commands", nargs="+", choices=("dsm", "ortho"), default=("dsm", "ortho"))
+    parser.add_argument("--commands", nargs="+", choices=("dsm", "dtm", "ortho"), default=("dsm", "ortho"))
     parser.add_argument("--folder", type=Path, help="to keep the block in, and to take it from where it is there")
     parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--side", type=float, default=300.0, help="of the square that dsm measures, m")
+    parser.add_argument("--side", type=float, default=300.0, help="of the square that dsm and dtm measure, m; 0: all")
     arguments = parser.parse_args()
     os.environ["AEROTRI_THREADS"] = str(arguments.threads)
     if arguments.folder is not None:
@@ -68,12 +69,13 @@ def _measure(folder: Path, arguments: argparse.Namespace) -> None:
     photographs = sorted((folder / "block" / "photographs").glob("*.tif"))
     middle, _, _ = _extent(folder)
     half = arguments.side / 2.0
-    square = [f"{value:.1f}" for value in (*(middle[:2] - half), *(middle[:2] + half))]
+    square = ["--area", *(f"{value:.1f}" for value in (*(middle[:2] - half), *(middle[:2] + half)))] if half else []
     columns, rows = arguments.size
     print(f"\n{len(photographs)} photographs of {columns} × {rows} pixels, 3 × 8 bits, {arguments.threads} thread(s)\n")
     print(HEAD, flush=True)
     commands = {
-        "dsm": ["--out", "dsm", "--no-plots", "--area", *square],
+        "dsm": ["--out", "dsm", "--no-plots", *square],
+        "dtm": ["--out", "dtm", "--no-plots", *square],
         "ortho": ["surface.tif", "--out", "ortho", "--no-plots", "--cell", str(GSD_M)],
     }
     for name in arguments.commands:

@@ -50,5 +50,9 @@ def _summary(found: SurfaceComparison) -> list[str]:
         f"LE90 {s.le90:.3f}, largest {s.max:.3f} m",
     ]
     if found.bias_sigma is not None:
-        lines.append(f"σ of the bias {two_digits(1e3 * found.bias_sigma)} mm; noise length {found.noise_length:.3g} m")
+        shared = found.matching_shared
+        part = f" ({two_digits(1e3 * shared)} mm by errors that neighbouring cells share)" if shared > 0.0 else ""
+        lines.append(
+            f"σ of the bias {two_digits(1e3 * found.bias_sigma)} mm{part}; noise length {found.noise_length:.3g} m"
+        )
     return [*lines, *([c.alignment_text] if c.alignment_text else [])]

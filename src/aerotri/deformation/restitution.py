@@ -16,6 +16,7 @@ from aerotri.deformation.error_parameters import error_rows
 from aerotri.deformation.orientation import Orientation, calibrated_orientation
 from aerotri.deformation.photo_errors import PhotoErrors, errors_by_image
 from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.camera_field import CameraField
 
 FREE, ABSORBED, GIVEN = "free", "absorbed", "given"
 VARIANTS = (FREE, ABSORBED)
@@ -52,6 +53,7 @@ class Restitution:
     follows : (n, 9, p) partials of the used orientation by the additional parameters, as `absorbed_partials`.
     covariance : (p, p) of the additional parameters, σ̂0² and the model part included.
     change : how the errors of the photographs change that make the model part, '' where there is none.
+    left : what the additional parameters leave of image errors; None where nothing shows, or nobody asked.
     """
 
     variant: str
@@ -62,6 +64,7 @@ class Restitution:
     follows: np.ndarray
     covariance: np.ndarray
     change: str = ""
+    left: CameraField | None = None
 
 
 def sigma_in_words(variant: str, change: str) -> str:

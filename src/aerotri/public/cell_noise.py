@@ -12,7 +12,7 @@ from aerotri.public.dense import COUNT, MATCHING, SURFACE, DenseSurface
 from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.rasters.held import HeldRaster
 from aerotri.volume.cell_noise import NO_NOISE, CellNoise
-from aerotri.volume.lasting import Lasting
+from aerotri.volume.lasting import NO_LASTING, Lasting
 
 NOISE_LENGTH, LASTING_SIGMA, LASTING_LENGTH = "NOISE_LENGTH_M", "SHARED_SIGMA_M", "SHARED_LENGTH_M"
 """Names in the metadata of dsm.tif."""
@@ -29,9 +29,27 @@ def noise_of_dense(dense: DenseSurface) -> CellNoise:
         ]
         sigma[place], count[place] = tile.sigma, tile.count
     noise, photographs = HeldRaster(sigma, o.grid, None, MATCHING), HeldRaster(count, o.grid, None, COUNT)
+    return CellNoise(noise, 0.0 if length is None else length, photographs, lasting_of_dense(dense))
+
+
+def lasting_of_dense(dense: DenseSurface) -> Lasting:
+    """Errors that do not average out, of a dense surface in memory."""
     shared = dense.summary["matching_shared"]
-    lasting = Lasting(shared["sigma_Z_m"], shared["length_m"])
-    return CellNoise(noise, 0.0 if length is None else length, photographs, lasting)
+    return Lasting(shared["sigma_Z_m"], shared["length_m"])
+
+
+def lasting_of_file(path: Path | None) -> Lasting:
+    """Errors that do not average out, as a GeoTIFF states them; none of any other file.
+
+    Raises
+    ------
+    InputError
+        When what it states is no length.
+    """
+    if path is None or not path.is_file() or path.suffix.lower() not in (".tif", ".tiff"):
+        return NO_LASTING
+    with RasterReader(path) as reader:
+        return Lasting(*(_length(reader.tag(name), path) for name in (LASTING_SIGMA, LASTING_LENGTH)))
 
 
 def noise_of_file(path: Path | None, stack: ExitStack) -> CellNoise:

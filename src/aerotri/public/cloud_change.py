@@ -129,9 +129,12 @@ class MeasuredCloudChange:
         with atomic_folder(target, own=OWN_NAMES) as folder:
             pq.write_table(self.distances.to_arrow(), folder / TABLE, compression="zstd")
             if plots:
+                from aerotri.report.documents.picture_texts import save_translated
                 from aerotri.report.pages.cloud_change import write_cloud_change_page
                 from aerotri.report.plots.rendering import save_plots
 
+                for name, draw in (("distances", self.plot.distances), ("histogram", self.plot.histogram)):
+                    save_translated(name, draw, folder / "plots")
                 drawn = save_plots(self.plot.all(), folder / "plots")
                 write_cloud_change_page(self.summary, drawn, folder / PAGE, self.head)
             write_json(folder / RECORD, self.summary)

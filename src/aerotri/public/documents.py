@@ -13,6 +13,8 @@ from aerotri.conventions import FilePath, InputError
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.change import RECORD as CHANGE
 from aerotri.public.change import MeasuredChange
+from aerotri.public.cloud_change import RECORD as CLOUD_CHANGE
+from aerotri.public.cloud_change import MeasuredCloudChange
 from aerotri.public.progress import StageReport
 from aerotri.public.volume_result import RECORD as VOLUME
 from aerotri.public.volume_result import MeasuredVolume
@@ -25,6 +27,11 @@ if TYPE_CHECKING:
 DocumentKind = Literal["report", "calibration"]
 REPORT, CALIBRATION, OF_VOLUME, OF_CHANGE = "adjustment.pdf", "calibration.pdf", "volume.pdf", "change.pdf"
 PDF_NAMES = (REPORT, CALIBRATION, OF_VOLUME, OF_CHANGE)
+KINDS = {MeasuredVolume: VOLUME, MeasuredChange: CHANGE, MeasuredCloudChange: CLOUD_CHANGE}
+"""Results that have a certificate, and the file that says so in a folder."""
+NEEDED = {VOLUME: "dtm", CHANGE: "volumes", CLOUD_CHANGE: "core_points"}
+"""What such a file cannot be without."""
+PICTURES = ("thickness", "budget", "difference", "distances", "histogram")
 
 
 @dataclass(frozen=True)
@@ -72,9 +79,15 @@ class Made:
 
 def is_volume_or_change(result: object) -> bool:
     """Whether a result, or the folder of one, is a volume or a change."""
-    if isinstance(result, MeasuredVolume | MeasuredChange):
-        return True
-    return not isinstance(result, Adjustment) and any((Path(str(result)) / name).is_file() for name in (VOLUME, CHANGE))
+    return _record_of(result) is not None
+
+
+def _record_of(result: object) -> str | None:
+    """Name of the file with the numbers of a volume or a change, given itself or its folder."""
+    if isinstance(result, Adjustment):
+        return None
+    own = next((name for kind, name in KINDS.items() if isinstance(result, kind)), None)
+    return own or next((name for name in KINDS.values() if (Path(str(result)) / name).is_file()), None)
 
 
 def adjustment_document(result: Adjustment, options: DocumentOptions, report: StageReport) -> Made:
@@ -106,8 +119,9 @@ def adjustment_document(result: Adjustment, options: DocumentOptions, report: St
 
 
 def certificate(
-    result: MeasuredVolume | MeasuredChange | FilePath, options: DocumentOptions, report: StageReport
-) -> Made:
+    result: MeasuredVolume | MeasuredChange | MeasuredCloudChange | FilePath, options: DocumentOptions,
+    report: StageReport,
+) -> Made:  # fmt: skip
     """The certificate of a volume or of a change, given itself or its folder.
 
     Raises
@@ -116,21 +130,24 @@ def certificate(
         When the folder cannot be read, or a document of another kind is asked for.
     """
     from aerotri.report.documents.change import change_certificate
+    from aerotri.report.documents.cloud_change import cloud_change_certificate
     from aerotri.report.documents.typesetting import pdf_of
     from aerotri.report.documents.volume import volume_certificate
 
     if options.kind != "report":
         raise InputError("a volume or a change has no calibration", "give the result of an adjustment")
-    folder = None if isinstance(result, MeasuredVolume | MeasuredChange) else Path(result)
-    is_volume = isinstance(result, MeasuredVolume) if folder is None else (folder / VOLUME).is_file()
-    content, plots = _content_of(result, folder, VOLUME if is_volume else CHANGE, options.language)
-    made = _time_of(None if folder is None else folder / (VOLUME if is_volume else CHANGE))
+    folder = None if isinstance(result, MeasuredVolume | MeasuredChange | MeasuredCloudChange) else Path(result)
+    record = _record_of(result) or CHANGE
+    content, plots = _content_of(result, folder, record, options.language)
+    made = _time_of(None if folder is None else folder / record)
     project, notes = _project(options.project, folder, content)
-    context = _context(options, made, project, content["dtm"] if is_volume else content["second"], False)
+    context = _context(options, made, project, content["dtm"] if record == VOLUME else content["second"], False)
     report.stage("writing", None)
-    if is_volume:
-        return Made(OF_VOLUME, pdf_of(volume_certificate(content, plots, context), made), notes)
-    return Made(OF_CHANGE, pdf_of(change_certificate(content, plots, context), made), notes)
+    certificates = {
+        VOLUME: volume_certificate, CHANGE: change_certificate, CLOUD_CHANGE: cloud_change_certificate,
+    }  # fmt: skip
+    found = certificates[record](content, plots, context)
+    return Made(OF_VOLUME if record == VOLUME else OF_CHANGE, pdf_of(found, made), notes)
 
 
 def _context(options: DocumentOptions, made: datetime, project: Project, name: str, of_block: bool) -> Context:
@@ -151,13 +168,10 @@ def _content_of(
     if folder is None:
         return result.summary, render_plots(in_language(result.plot.all(), language))
     content = _read(folder / record)
-    needed = "dtm" if record == VOLUME else "volumes"
-    if needed not in content:
-        said = "is a change of point clouds, which has no volumes" if "core_points" in content else "is damaged"
-        remedy = "give the change of two surfaces" if "core_points" in content else "compute the result again"
-        raise InputError(said, remedy, folder / record)
+    if NEEDED[record] not in content:
+        raise InputError("is damaged", "compute the result again", folder / record)
     plots: dict[str, RenderedPlot] = {}
-    for name in ("thickness", "budget", "difference"):
+    for name in PICTURES:
         for drawn in (name, f"{name}.{language}"):
             svg, png = folder / "plots" / f"{drawn}.svg", folder / "plots" / f"{drawn}.png"
             if svg.is_file() and png.is_file():

@@ -13,6 +13,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError, counted
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.change import MeasuredChange
+from aerotri.public.cloud_change import MeasuredCloudChange
 from aerotri.public.documents import (
     PDF_NAMES,
     DocumentKind,
@@ -54,7 +55,7 @@ class Exported:
 
 
 def export(
-    result: Adjustment | MeasuredVolume | MeasuredChange | FilePath,
+    result: Adjustment | MeasuredVolume | MeasuredChange | MeasuredCloudChange | FilePath,
     out: FilePath,
     to: ExportFormat = "gpkg",
     *,
@@ -114,7 +115,7 @@ def export(
         if to == "pdf" and is_volume_or_change(result):
             made = certificate(cast("MeasuredVolume", result), options, report)
             return _keep(made, target, ())
-        if isinstance(result, MeasuredVolume | MeasuredChange) or is_volume_or_change(result):
+        if isinstance(result, MeasuredVolume | MeasuredChange | MeasuredCloudChange) or is_volume_or_change(result):
             raise InputError(f"a volume or a change is not written as {to}", "use pdf, or give an adjustment")
         if not isinstance(result, Adjustment):
             report.stage("reading", None)

@@ -14,7 +14,9 @@ from aerotri.conventions import FilePath, InputError
 if TYPE_CHECKING:
     from aerotri.observations.project import Project
 
-RECORDS = ("adjustment.json", "dsm.json", "dtm.json", "volume.json", "change.json", "compare.json")
+RECORDS = (
+    "adjustment.json", "dsm.json", "dtm.json", "volume.json", "change.json", "cloud_change.json", "compare.json",
+)  # fmt: skip
 """Files that say whose a result is."""
 
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from aerotri.public.surfaces import SurfaceLike
     from aerotri.rasters.grids import Grid
     from aerotri.terrain.compare import Comparison
+    from aerotri.volume.lasting import Lasting
 
 RECORD = "compare.json"
 OWN_NAMES = (RECORD, "difference.tif", "plots")
@@ -50,6 +51,7 @@ class SurfaceComparison:
     crs : 'EPSG:n', None where not known.
     notes : what was done to bring the surfaces to metres, in sentences.
     head : of files. settings : every argument that was used, as compare.json has them.
+    lasting : of test and control, errors of dense matching that do not average out.
     """
 
     record: Comparison
@@ -60,6 +62,7 @@ class SurfaceComparison:
     notes: tuple[str, ...] = ()
     head: Head = field(default_factory=Head)
     settings: list[dict[str, Any]] = field(default_factory=list)
+    lasting: tuple[Lasting, ...] = ()
 
     @property
     def rmse(self) -> float:
@@ -83,12 +86,29 @@ class SurfaceComparison:
 
     @property
     def bias_sigma(self) -> float | None:
-        """m, σ of the mean difference as its cells scatter: those of one noise count once; None where not known."""
+        """m, σ of the mean difference; None where not known.
+
+        As its cells scatter, those of one noise once, and what errors that do not average out add.
+        """
         if self.noise_length is None:
             return None
         s, grid = self.record.statistics, self.record.grid
         independent = max(s.count * grid.cell_x * grid.cell_y / self.noise_length**2, 1.0)
-        return s.std / float(np.sqrt(independent))
+        return float(np.hypot(s.std / np.sqrt(independent), self.matching_shared))
+
+    @cached_property
+    def matching_shared(self) -> float:
+        """m, σ of the mean difference by errors that neighbouring cells of dense surfaces share.
+
+        0 for other surfaces, and where one was moved onto the other: a shift takes the mean with it.
+        """
+        from aerotri.volume.lasting import lasting_variance_of_cells
+
+        if self.record.alignment is not None:
+            return 0.0
+        grid, known = self.record.grid, np.isfinite(self.record.difference)
+        weight, cell = known / max(int(known.sum()), 1), (grid.cell_x, grid.cell_y)
+        return float(np.sqrt(sum(lasting_variance_of_cells(weight, cell, one) for one in self.lasting)))
 
     @property
     def nmad(self) -> float:
@@ -122,7 +142,10 @@ class SurfaceComparison:
         """The content of compare.json."""
         from aerotri.formats.results.terrain import comparison_json
 
-        sure = {"sigma_bias_m": self.bias_sigma, "noise_length_m": self.noise_length}
+        sure = {
+            "sigma_bias_m": self.bias_sigma, "matching_shared_m": self.matching_shared,
+            "noise_length_m": self.noise_length,
+        }  # fmt: skip
         found = comparison_json(self.record, self.test, self.control, self.method)
         return self.head.as_dict() | found | sure | {"settings": self.settings}
 
@@ -236,7 +259,8 @@ def compare(
     crs = None if epsg is None else f"EPSG:{epsg}"
     head = Head(project_of(project, test, control), max(one.crs, other.crs, key=len))
     used = used_arguments(compare, {"method": method, "align": align, "cell": cell}, {"cell": "m"})
-    return SurfaceComparison(found, _name(test), _name(control), method, crs, notes, head, used)
+    lasting = tuple(map(_lasting_of, (test, control)))
+    return SurfaceComparison(found, _name(test), _name(control), method, crs, notes, head, used, lasting)
 
 
 def _check(method: str, align: str) -> None:
@@ -273,6 +297,14 @@ def _systems_in_words(both: Sequence[HeightSource], given: Sequence[SurfaceLike]
 
 def _name(surface: SurfaceLike) -> str:
     return Path(surface).name if isinstance(surface, str | os.PathLike) else as_surface(surface).label
+
+
+def _lasting_of(surface: SurfaceLike) -> Lasting:
+    """Errors that do not average out, of a dense surface in memory or a file of one; none of others."""
+    from aerotri.public.cell_noise import lasting_of_dense, lasting_of_file
+    from aerotri.public.dense import DenseSurface
+
+    return lasting_of_dense(surface) if isinstance(surface, DenseSurface) else lasting_of_file(_file(surface))
 
 
 def _sources(test: SurfaceLike, control: SurfaceLike, stack: ExitStack) -> tuple[HeightSource, HeightSource]:

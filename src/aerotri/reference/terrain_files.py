@@ -143,7 +143,18 @@ COMPARE_JSON = (
     Item("alignment.shift_m[]", "number", "Shift in X, Y, Z.", "m"),
     Item("alignment.rotation_rad[]", "number", "Rotation about X, Y, Z.", "rad"),
     Item("alignment.about_m[]", "number", "Point of the rotation.", "m"),
-    Item("sigma_bias_m", "number?", "Standard deviation of the mean difference: cells of one noise count once.", "m"),
+    Item(
+        "sigma_bias_m",
+        "number?",
+        "Standard deviation of the mean difference: cells of one noise count once, and `matching_shared_m` is in it.",
+        "m",
+    ),
+    Item(
+        "matching_shared_m",
+        "number",
+        "The part of errors that neighbouring cells of dense surfaces share; 0 for other surfaces, and with `align`.",
+        "m",
+    ),
     Item("noise_length_m", "number?", "Side of the square whose cells share one noise; null where too few tell.", "m"),
     *ARGUMENTS,
 )

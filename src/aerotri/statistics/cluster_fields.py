@@ -209,29 +209,42 @@ def nodes_of(system: NormalSystem, label: np.ndarray) -> _kernels.Nodes:
     """The rays among the nodes of their photograph's format, photographs with labels (n,)."""
     u, block = system.unknowns, system.unknowns.block
     half = np.array([camera.half_format_mm for camera in block.cameras])[block.images.camera[u.images]][u.rays.image]
-    number = np.array(_counts(block.cameras))
-    at = np.clip(0.5 * (u.rays.xy / half + 1.0), 0.0, 1.0) * (number - 1)
+    counts = node_counts(block.cameras)
+    return _kernels.Nodes(*nodes_at(u.rays.xy, half, counts), label, counts[0] * counts[1])
+
+
+def nodes_at(xy: np.ndarray, half: np.ndarray, counts: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """(r, 4) nodes about image places (r, 2) mm and their bilinear weights.
+
+    Parameters
+    ----------
+    half : (r, 2) mm, half the format. counts : nodes along x and y.
+    """
+    number = np.array(counts)
+    at = np.clip(0.5 * (xy / half + 1.0), 0.0, 1.0) * (number - 1)
     low = np.minimum(at.astype(np.int64), number - 2)
     x, y = (at - low).T
     node = low[:, :1] * number[1] + low[:, 1:] + np.array([0, 1, number[1], number[1] + 1])
     weight = np.column_stack([(1.0 - x) * (1.0 - y), (1.0 - x) * y, x * (1.0 - y), x * y])
-    return _kernels.Nodes(node, weight, label, int(number.prod()))
+    return node, weight
 
 
-def _counts(cameras: Sequence[Camera]) -> tuple[int, int]:
+def node_counts(cameras: Sequence[Camera]) -> tuple[int, int]:
     """Nodes along x and y."""
-    half = _half_format(cameras)
+    half = half_format(cameras)
     return NODES if half[0] >= half[1] else (NODES[1], NODES[0])
 
 
-def _half_format(cameras: Sequence[Camera]) -> np.ndarray:
+def half_format(cameras: Sequence[Camera]) -> np.ndarray:
     """(2,) mm, of the largest camera."""
     return np.max([camera.half_format_mm for camera in cameras], axis=0)
 
 
-def _correlations(cameras: Sequence[Camera], length: float, smooth: bool) -> np.ndarray:
+def correlations(cameras: Sequence[Camera], length: float, smooth: bool) -> np.ndarray:
     """(nodes, nodes) R for a length in mm."""
-    axes = [half * np.linspace(-1.0, 1.0, k) for half, k in zip(_half_format(cameras), _counts(cameras), strict=True)]
+    axes = [
+        half * np.linspace(-1.0, 1.0, k) for half, k in zip(half_format(cameras), node_counts(cameras), strict=True)
+    ]
     xy = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     squares = np.sum((xy[:, None] - xy) ** 2, axis=2) / length**2
     return np.exp(-0.5 * squares) if smooth else np.exp(-np.sqrt(squares))
@@ -266,11 +279,11 @@ def fit_field(
     there = values > SAME * values[-1]
     root, freedom = vectors[:, there] * np.sqrt(values[there]), int(there.sum())
     z = (vectors[:, there].T @ scores) / np.sqrt(values[there]) / sigma0
-    nodes, half = len(scores) // (2 * len(camera)), float(np.hypot(*_half_format(cameras)))
+    nodes, half = len(scores) // (2 * len(camera)), float(np.hypot(*half_format(cameras)))
     best, sizes = None, (unit * SIZES) ** 2
     for smooth in (False, True):
         for length in LENGTHS:
-            r = _correlations(cameras, half * length, smooth)
+            r = correlations(cameras, half * length, smooth)
             spread = root.reshape(2 * len(camera), nodes, -1)
             power, patterns = np.linalg.eigh(np.einsum("cip,ij,cjq->pq", spread, r, spread, optimize=True) / sigma0**2)
             power, squares = np.maximum(power, 0.0), (patterns.T @ z) ** 2

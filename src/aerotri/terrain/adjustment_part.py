@@ -2,8 +2,9 @@
 
 [D] The ideal rays l = m − d(m; p) of a picket give dP = −G·(∂π/∂θ·dθ + ∂d/∂p·dp), G = (AᵀA)⁻¹Aᵀ of its intersection.
 With J = dP/dx over all unknowns x of the reduced system its covariance is σ̂0²·J·Q·Jᵀ, by a solution with the factor.
-Where groups of photographs share errors it has a model part. It changes slowly over the ground: some pickets tell it
-for all.
+Where groups of photographs share errors it has a model part. Where the residuals show that the parameters leave image
+errors it has the part of these, through the orientation and at the rays of the picket itself
+(`statistics.camera_field`). It changes slowly over the ground: some pickets tell it for all.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from aerotri.deformation.model_grid import places_of
 from aerotri.deformation.restitution import Restitution
 from aerotri.functional_model.collinearity import RayPartials, linearise
 from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.camera_field import CameraField, is_of_camera
 from aerotri.statistics.model_of_functions import model_of_functions
 from aerotri.terrain.pickets import Pickets
 
@@ -71,7 +73,7 @@ def covariances_at(
     def partials(part: slice) -> np.ndarray:
         return _by_unknowns(calibration, restitution, rows, local[part], photographs[part], plan=False)
 
-    return _covariances(calibration, local, partials, 3)
+    return _covariances(calibration, restitution.left, local, partials, 3)
 
 
 def plan_covariances(
@@ -88,7 +90,7 @@ def plan_covariances(
     def partials(part: slice) -> np.ndarray:
         return _by_unknowns(calibration, restitution, rows, local[part], photograph[part, None], plan=True)
 
-    return _covariances(calibration, local, partials, 3)[:, :2, :2].copy()
+    return _covariances(calibration, restitution.left, local, partials, 3)[:, :2, :2].copy()
 
 
 def shown_covariances(
@@ -117,32 +119,38 @@ def shown_covariances(
         surface = _by_unknowns(calibration, restitution, rows, local[part], measured_by[part], plan=False)
         return np.concatenate([shown + along[part, :, None] * surface[:, 2:], surface], axis=1)
 
-    return _covariances(calibration, local, partials, 6)
+    return _covariances(calibration, restitution.left, local, partials, 6)
 
 
 def _covariances(
-    calibration: Adjustment, local: np.ndarray, partials: Callable[[slice], np.ndarray], size: int
-) -> np.ndarray:
+    calibration: Adjustment, left: CameraField | None, local: np.ndarray, partials: Callable[[slice], np.ndarray],
+    size: int,
+) -> np.ndarray:  # fmt: skip
     """(n, size, size) m² in the CRS of vectors of three coordinates, one behind the other.
 
     Parameters
     ----------
-    local : (n, 3) m in the frame. partials : (k, size, u) by the unknowns of the reduced system, of some places.
+    left : what the parameters leave of image errors. local : (n, 3) m in the frame.
+    partials : (k, size, u + f) of some places, by the unknowns of the reduced system, then by the patterns of `left`.
     """
     frame = places_of(calibration)
     factor = calibration.system.factorise(calibration.solution.equations)
+    count = 6 * len(calibration.system.unknowns.images) + len(calibration.system.unknowns.shared)
     covariances = np.empty((len(local), size, size))
     for first in range(0, len(local), AT_A_TIME):
         part = slice(first, first + AT_A_TIME)
-        j = partials(part)
-        by_columns = np.ascontiguousarray(j.reshape(-1, j.shape[2]).T)
+        j, by_errors = np.split(partials(part), [count], axis=2)
+        by_columns = np.ascontiguousarray(j.reshape(-1, count).T)
         q = factor.solve(by_columns)
-        both = np.einsum("nau,unb->nab", j, q.reshape(j.shape[2], len(j), size))
-        covariance = calibration.local.outcome.sigma0**2 * both
-        if calibration.model is not None:
+        both = np.einsum("nau,unb->nab", j, q.reshape(count, len(j), size))
+        covariance = (calibration.local.outcome.sigma0 if left is None else left.noise) ** 2 * both
+        if calibration.model is not None and not (left is not None and is_of_camera(calibration)):
             covariance = covariance + model_of_functions(
                 calibration.system, calibration.solution, calibration.model, by_columns, q, size
             )
+        if left is not None:
+            by_errors = by_errors + j @ left.by_unknowns
+            covariance = covariance + by_errors @ np.swapaxes(by_errors, 1, 2)
         covariances[part] = frame.covariances(local[part], covariance)
     return covariances
 
@@ -186,7 +194,7 @@ def _by_unknowns(
     calibration: Adjustment, restitution: Restitution, rows: np.ndarray, local: np.ndarray, photographs: np.ndarray,
     plan: bool,
 ) -> np.ndarray:  # fmt: skip
-    """(n, 3, u) partials of intersected points by the unknowns of the reduced system.
+    """(n, 3, u + f) partials of intersected points by the unknowns of the reduced system, then by patterns of errors.
 
     plan : whether the height is known, so that one ray gives X and Y; the partials of Z are 0.
     """
@@ -232,4 +240,10 @@ def _by_unknowns(
                 e = -gain[has] @ partials
                 for k, col in enumerate(columns.tolist()):
                     np.add.at(j, (picket[has][:, None], np.arange(3), first_shared + col), e[:, :, k])
-    return j
+    left = restitution.left
+    if left is None:
+        return j
+    by_errors = np.zeros((len(local), 3, left.by_unknowns.shape[1]))
+    camera = calibration.local.block.images.camera[image]
+    np.add.at(by_errors, picket, left.moved(gain, rays.prediction, camera))
+    return np.concatenate([j, by_errors], axis=2)

@@ -23,6 +23,7 @@ from aerotri.deformation.photo_errors import PhotoErrors
 from aerotri.deformation.restitution import FREE, Restitution, restitution_of
 from aerotri.rasters.images import open_photograph
 from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.camera_field import known_field
 from aerotri.terrain._view_kernels import View
 
 CACHE_BYTES = 500_000_000
@@ -268,7 +269,8 @@ def photographs_of(
     InputError
         For scanned film, whose pixels are no image coordinates, and for photographs without orientation.
     """
-    block, restitution = calibration.local.block, restitution_of(calibration, FREE)
+    block = calibration.local.block
+    restitution = replace(restitution_of(calibration, FREE), left=known_field(calibration))
     for row, path in zip(rows.tolist(), paths, strict=True):
         if row in block.interior_fits:
             raise InputError("is scanned film, which matching does not read", "resample it to its fiducials", path)

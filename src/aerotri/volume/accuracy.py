@@ -223,7 +223,7 @@ def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: Sig
         "base": np.sqrt(beside.ground),
         "boundary": np.sqrt(beside.edge),
     }
-    if any(one.calibration.model is not None for one in both):
+    if any(one.calibration.model is not None or one.response.model > 0.0 for one in both):
         parts = {"adjustment": parts["adjustment"], MODEL: np.sqrt(sum(one.response.model for one in both))} | parts
         said += [_model_in_words(one, parts) for one in both if one.response.model > 0.0]
     if any(one.lasting.sigma_m > 0.0 for one in (part, base_part) if one is not None):
@@ -256,9 +256,13 @@ def _model_in_words(part: Part, parts: dict[str, float]) -> str:
     found = part.calibration.local.model_part
     change = "" if found is None else found.change
     noise, total = parts["adjustment"], np.hypot(parts["adjustment"], parts[MODEL])
+    why = (
+        f"the errors of the photographs change {change}, more than noise explains" if change
+        else "the residuals show image errors that the additional parameters leave"
+    )  # fmt: skip
     return (
-        f"the errors of the photographs change {change}, more than noise explains: with this model part the "
-        f"adjustment's share of σ is {in_digits(total, 4)} m³ instead of {in_digits(noise, 4)} m³"
+        f"{why}: with this model part the adjustment's share of σ is {in_digits(total, 4)} m³ instead of "
+        f"{in_digits(noise, 4)} m³"
     )
 
 

@@ -17,6 +17,7 @@ from aerotri.volume.boundary import Boundary
 from aerotri.volume.cell_noise import NO_NOISE, CellNoise, cells_sharing, photographs_at, shares_of_noise
 from aerotri.volume.counted import Counted, counted_pieces
 from aerotri.volume.functionals import Functional, cell_volume, tin_volume, triangulated
+from aerotri.volume.kinks import lost_on_either_side
 from aerotri.volume.lasting import NO_LASTING, Lasting, lasting_variance
 from aerotri.volume.pickets import (
     MeasuredPickets,
@@ -183,10 +184,20 @@ def _counted_in(tin: _Tin, counted: Counted | None) -> tuple[Region | None, Func
 def _side_of_pickets(tin: _Tin, ground: Ground | None, counted: Counted) -> Part:
     """The share of a cut or a fill."""
     region, functional, response = _counted_in(tin, counted)
-    between = None if ground is None or not counted.sign else between_on_side(ground, counted)
+    between = None if ground is None or not counted.sign else _between_on_side(tin, ground, counted)
     pickets, measured = tin.pickets, Measured(tin.pickets, functional.gradient)
     rays = len(pickets.image)
     return Part(tin.calibration, response, between, len(pickets), rays, 0.0, measured, region=region)
+
+
+def _between_on_side(tin: _Tin, ground: Ground, counted: Counted) -> Between:
+    """What straight triangles leave out of a cut or a fill: by the random function, or by kinks where they say more."""
+    found = between_on_side(ground, counted)
+    net = ground.between(ground.more, ground.variance).curvature
+    alike = found.curvature - 0.5 * counted.sign * net
+    area = np.bincount(tin.pieces.triangle, tin.pieces.area, len(tin.triangles))
+    kinks = lost_on_either_side(tin.pickets.xyz, tin.triangles, area, counted, ground.noise)
+    return replace(found, curvature=found.curvature + max(kinks - alike, 0.0))
 
 
 def part_of_measured(

@@ -7,9 +7,10 @@ N_k = A_kᵀW_kA_k, a change of θ moves P_k by −N_k⁻¹A_kᵀW_kB_k, so that
     Var V = σ̂0²·cᵀQc + Σ g_kᵀN_k⁻¹g_k,   Qc by one solution with the reduced factor of the final normal equations.
 
 The first part holds every correlation between pickets. Where groups of photographs share errors, it has a model part,
-see `statistics.model_of_functions`. An image error d that is not corrected moves V by Σ g_kᵀN_k⁻¹A_kᵀW_k·d, as does the
-way of the camera during the readout of a rolling shutter, and where the orientation was adjusted without parameters by
-c times its change besides.
+see `statistics.model_of_functions`; so has what the parameters leave of the errors of a camera, see
+`statistics.camera_field`: rays of pickets have these errors too. An image error d that is not corrected moves V by
+Σ g_kᵀN_k⁻¹A_kᵀW_k·d, as does the way of the camera during the readout of a rolling shutter, and where the orientation
+was adjusted without parameters by c times its change besides.
 """
 
 from __future__ import annotations
@@ -32,8 +33,9 @@ from aerotri.functional_model.additional_parameters import Parameter
 from aerotri.functional_model.additional_parameters.registry import INTERIOR_FAMILIES
 from aerotri.functional_model.rotation import logarithm
 from aerotri.image_errors.tile_grid import Tile, tiles_of
-from aerotri.observations import Camera
+from aerotri.observations import Block, Camera
 from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.camera_field import CameraField, is_of_camera, known_field
 from aerotri.statistics.covariance import inner_datum
 from aerotri.statistics.model_of_functions import model_of_functions
 from aerotri.volume import _response_kernels as _kernels
@@ -130,12 +132,32 @@ def respond(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, cor
     if u.block.settings.adjustment.datum == "inner" and u.motions.count:
         cofactor += _inner_correction(calibration, factor, c)
     variance = calibration.local.outcome.sigma0**2 * cofactor
-    model = 0.0
-    if calibration.model is not None:
+    model, left = 0.0, known_field(calibration)
+    if left is not None:
+        model = _left_by_parameters(left, u.block, errors, nodes, deposits, c)
+    if calibration.model is not None and not (left is not None and is_of_camera(calibration)):
         solution, root = calibration.solution, calibration.model
         own = np.full((1, 1, 1), cofactor)
-        model = float(model_of_functions(system, solution, root, c[:, None], solved[:, None], 1, own)[0, 0, 0])
+        model += float(model_of_functions(system, solution, root, c[:, None], solved[:, None], 1, own)[0, 0, 0])
     return Response(c, solved, variance, model, noise, by_eo, by_interior, by_parameters, error)
+
+
+def _left_by_parameters(
+    left: CameraField, block: Block, errors: tuple[PhotoErrors, ...], nodes: _Nodes, deposits: np.ndarray, c: np.ndarray
+) -> float:
+    """Variance of V by what the parameters leave of image errors, through the unknowns and at the rays of pickets.
+
+    Parameters
+    ----------
+    deposits : (·, 2) ∂V by the image errors at the nodes. c : ∂V by the unknowns.
+    """
+    names = [camera.name for camera in block.cameras]
+    by_patterns = left.by_unknowns.T @ c
+    for group, own in zip(errors, nodes.of_group, strict=True):
+        used = np.flatnonzero(deposits[own].any(axis=1))
+        camera = np.full(len(used), names.index(group.camera.name))
+        by_patterns += left.moved(deposits[own][used, None, :], nodes.xy[own][used], camera).sum(axis=(0, 1))
+    return float(by_patterns @ by_patterns)
 
 
 def covariance(calibration: Adjustment, first: Response, second: Response) -> float:

@@ -54,7 +54,14 @@ def figures_of_surfaces():
     return {"thickness": volume, "change": aerotri.change(one, two, align="none").plot.difference()}, set()
 
 
-@pytest.mark.parametrize("drawn", [figures_of_an_adjustment, figures_of_surfaces])
+def figures_of_clouds():
+    rng = np.random.default_rng(2)
+    before, after = (np.column_stack([rng.uniform(0.0, 20.0, (4000, 2)), rng.normal(0.0, 0.02, 4000)]) for _ in "ab")
+    after[:, 2] += np.where(after[:, 0] < 8.0, 0.5, 0.0) - np.where(after[:, 0] > 14.0, 0.5, 0.0)
+    return aerotri.cloud_change(before, after).plot.all(), set()
+
+
+@pytest.mark.parametrize("drawn", [figures_of_an_adjustment, figures_of_surfaces, figures_of_clouds])
 def test_every_line_is_german(drawn):
     figures, names = drawn()
     for name, figure in figures.items():

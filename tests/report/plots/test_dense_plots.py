@@ -1,10 +1,14 @@
 """Pictures of a dense surface: as far as it was measured, with the σ of matching."""
 
+from types import SimpleNamespace
+
 import numpy as np
 from matplotlib.text import Text
 
+from aerotri.public.dense_plots import DensePlots
 from aerotri.rasters.grids import Grid
 from aerotri.report.plots.terrain import plot_dense
+from aerotri.terrain.dense.tile_files import tile_windows
 
 
 def test_the_picture_ends_where_measured_cells_end():
@@ -22,3 +26,16 @@ def test_the_picture_ends_where_measured_cells_end():
     words = " ".join(text.get_text() for text in figure.findobj(Text))
     assert "0.077 m" in words
     assert "σ of matching [m]" in words
+
+
+def test_every_cell_that_is_drawn_is_of_one_tile():
+    """Also where tiles end between two cells that are drawn, and where the last one is a row high."""
+    rng = np.random.default_rng(4)
+    for rows, columns in [(2401, 1300), (1202, 2402), *rng.integers(1, 5000, (30, 2)).tolist()]:
+        grid = Grid(rows, columns, 0.0, 0.0, 1.0, 1.0)
+        plots = DensePlots(SimpleNamespace(grid=grid), "block")
+        drawn = np.zeros((plots._drawn.rows, plots._drawn.columns), int)
+        for window in tile_windows(grid, int(rng.integers(16, 700))):
+            taken, place = plots._place(window)
+            drawn[place] += np.ones((window.rows, window.columns), int)[taken]
+        assert (drawn == 1).all()

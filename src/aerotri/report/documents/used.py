@@ -10,7 +10,7 @@ from aerotri.report.documents.words import NO_VALUE, Words, breakable
 
 
 def argument_parts(content: Mapping[str, Any], words: Words) -> list[Part]:
-    """All of `settings` in volume.json or change.json; nothing of a result that does not have them."""
+    """All of `settings` in the JSON file of a volume or a change; nothing of a result that does not have them."""
     used = content.get("settings") or []
     if not used:
         return []

@@ -1,0 +1,150 @@
+"""What parameters leave of a camera's errors: found in residuals, and in σ of what is measured with the orientation."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aerotri.deformation.restitution import restitution_of
+from aerotri.functional_model.additional_parameters import parse_parameters
+from aerotri.observations import Block
+from aerotri.pipeline.chain import adjust_keeping_system
+from aerotri.simulation import parse_spec, simulate
+from aerotri.simulation.truth import Truth
+from aerotri.statistics.camera_field import CameraField, camera_field
+from aerotri.statistics.cluster_fields import Field, half_format, node_counts, root_of_field
+from aerotri.statistics.clusters import Clusters
+from aerotri.terrain.adjustment_part import variances_at
+from aerotri.volume.pickets import Pickets
+from aerotri.volume.response import respond
+from small_blocks import with_adjustment
+
+SIGMA_UM = 1.0
+SPEC = {
+    "name": "strips",
+    "camera": {"cam": {"size_px": [6000, 4000], "pixel_um": 6.0, "focal_length_mm": 35.0}},
+    "flight": {"gsd_m": 0.1, "strips": 2, "images_per_strip": 5, "end_lap": 0.7, "side_lap": 0.4,
+               "attitude_sigma_deg": [1.0, 1.0, 2.0], "position_sigma_m": [5.0, 5.0, 3.0]},
+    "terrain": {"kind": "undulating", "height_m": 100.0, "relief_rms_m": 5.0, "wavelength_m": 200.0},
+    "tie_points": {"per_image": 250, "probability": 0.9, "sigma_um": SIGMA_UM},
+    "control": {"distance_bases": 1.0, "sigma_m": [0.01, 0.01, 0.01]},
+}  # fmt: skip
+
+
+def simulated(seed: int, parameters: str, errors_um: float = 0.0) -> tuple[Block, Truth]:
+    spec = SPEC
+    if errors_um:
+        camera = SPEC["camera"]["cam"] | {"errors": {"physical": {"rms_um": errors_um}}}
+        spec = SPEC | {"camera": {"cam": camera}}
+    block, truth = simulate(parse_spec(spec), seed)
+    return with_adjustment(block, additional_parameters=parse_parameters(parameters), model_part="off"), truth
+
+
+def test_noise_alone_leaves_nothing():
+    for seed in (1, 2, 3):
+        assert camera_field(adjust_keeping_system(simulated(seed, "brown:K1+K2+P1+P2")[0])) is None
+
+
+def measured_later(block: Block, chosen: np.ndarray) -> tuple[Block, Block]:
+    """The block without some points, and with them at weights that move nothing: as they are intersected afterwards."""
+    rays = block.image_points
+    later = np.isin(rays.point, chosen)
+    names = [name for name, value in vars(rays).items() if isinstance(value, np.ndarray) and len(value) == len(later)]
+    fewer = replace(rays, **{name: getattr(rays, name)[~later] for name in names})
+    weak = replace(rays, sigma=np.where(later.reshape(-1, *[1] * (rays.sigma.ndim - 1)), 1e3, 1.0) * rays.sigma)
+    return replace(block, image_points=fewer), replace(block, image_points=weak)
+
+
+def rays_of(block: Block, points: np.ndarray) -> np.ndarray:
+    """(n, m) photographs of points, −1 beyond those they have."""
+    rays = block.image_points
+    own = [rays.image[rays.point == point] for point in points]
+    out = np.full((len(points), max(map(len, own))), -1)
+    for k, images in enumerate(own):
+        out[k, : len(images)] = images
+    return out
+
+
+def test_what_lens_parameters_leave_is_in_sigma_of_points_measured_later():
+    """Errors of a camera of 5 µm that Brown's parameters describe in part: height errors over σ fall to about one."""
+    before, after = [], []
+    for seed in range(1, 7):
+        block, truth = simulated(seed, "brown:K1+K2+P1+P2", 5.0)
+        rays = block.image_points
+        count = np.bincount(rays.point, minlength=len(truth.points))
+        tie = np.setdiff1d(np.flatnonzero(count >= 3), block.control.point)
+        chosen = np.random.default_rng(seed).permutation(tie)[:100]
+        fewer, weak = measured_later(block, chosen)
+        found = adjust_keeping_system(fewer)
+        left = camera_field(found)
+        assert left is not None
+        assert 0.9 * SIGMA_UM < 1e3 * left.noise * np.median(rays.sigma) < 0.8 * found.local.outcome.sigma0_um
+        xyz = adjust_keeping_system(weak).result.points.xyz[chosen]
+        error, plain = xyz[:, 2] - truth.points[chosen, 2], restitution_of(found)
+        for into, restitution in ((before, plain), (after, replace(plain, left=left))):
+            given = np.arange(len(block.images)), xyz, rays_of(block, chosen)
+            into.append(np.mean(error**2 / variances_at(found, restitution, *given)[:, 2]))
+    assert np.sqrt(np.mean(before)) > 2.0
+    assert 0.6 < np.sqrt(np.mean(after)) < 1.4
+
+
+def test_a_volume_has_the_part_that_its_places_have():
+    """A functional that is the height of one place: its model part is that of the place, by other code."""
+    found = adjust_keeping_system(simulated(3, "brown:K1+K2", 5.0)[0])
+    block, left = found.local.block, camera_field(found)
+    assert left is not None
+    tie = np.setdiff1d(np.flatnonzero(found.local.points.rays >= 3), block.control.point)[:5]
+    xyz, seen = found.result.points.xyz[tie], rays_of(block, tie)
+    same_noise = replace(left, noise=found.local.outcome.sigma0)
+    given = np.arange(len(block.images)), xyz, seen
+    without, whole = (
+        variances_at(found, replace(restitution_of(found), left=one), *given)[:, 2] for one in (None, same_noise)
+    )
+    for k in range(len(tie)):
+        images = seen[k][seen[k] >= 0].astype(np.int64)
+        start = np.array([0, len(images)], np.int64)
+        picket = Pickets(xyz[k : k + 1], start, images, np.full(len(images), 1e-3), np.ones(1))
+        response = respond(found, picket, np.array([[0.0, 0.0, 1.0]]))
+        assert response.variance == pytest.approx(without[k], rel=1e-3)
+        # errors of rays are bilinear between nodes here
+        assert response.model == pytest.approx(whole[k] - without[k], rel=0.02)
+
+
+def test_what_parameters_describe_moves_nothing():
+    """A field that is b1 and b2 of the lens, which were estimated: what it does to rays and to unknowns cancels."""
+    found = adjust_keeping_system(simulated(1, "brown:b1+b2")[0])
+    system, block = found.system, found.local.block
+    counts, half = node_counts(block.cameras), half_format(block.cameras)
+    x, _ = np.meshgrid(*(h * np.linspace(-1.0, 1.0, k) for h, k in zip(half, counts, strict=True)), indexing="ij")
+    root = 1e-3 * x.ravel()[:, None]
+    field = Field(1.0, 1.0, True, 0.0, 1.0, 1, root)
+    factor = system.factorise(found.solution.equations)
+    one = Clusters("camera", np.zeros(len(system.unknowns.images), np.int64), ("",), 1)
+    made, _ = root_of_field(system, found.solution, factor, one, field)
+    by = np.concatenate([made.images.reshape(-1, made.images.shape[2]), made.shared])
+    # of the two components the error along x alone is b1
+    by = by[:, :1] @ np.array([[1.0, 0.0]])
+    half_of_all = np.array([camera.half_format_mm for camera in block.cameras])
+    left = CameraField(1.0, 1.0, 20.0, found.local.outcome.sigma0, root, half_of_all, counts, np.zeros(1, int), by)
+    rows, seen = np.arange(len(block.images)), found.local.points.rays >= 3
+    tie = np.setdiff1d(np.flatnonzero(seen), block.control.point)[:40]
+    gain = np.random.default_rng(1).normal(size=(3, 2, 2))
+    assert left.moved(gain, np.array([[1.0, 2.0], [-3.0, 4.0], [8.0, 0.0]]), np.zeros(3, int))[
+        :, :, 0
+    ] == pytest.approx(gain[:, :, 0] * 1e-3 * np.array([[1.0], [-3.0], [8.0]]))
+    alone = replace(restitution_of(found), left=_first_component(left))
+    both = variances_at(found, alone, rows, found.result.points.xyz[tie], rays_of(block, tie))
+    without = variances_at(found, restitution_of(found), rows, found.result.points.xyz[tie], rays_of(block, tie))
+    assert both == pytest.approx(without, rel=1e-4)
+
+
+def _first_component(field: CameraField) -> CameraField:
+    """The field with errors along x alone."""
+    return _AlongX(**vars(field))
+
+
+class _AlongX(CameraField):
+    def moved(self, gain, xy, camera):
+        changed = super().moved(gain, xy, camera)
+        changed[:, :, 1:] = 0.0
+        return changed
