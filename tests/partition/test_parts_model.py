@@ -145,10 +145,9 @@ def test_weights_of_rays_are_those_of_the_adjustment(tmp_path, to_rounding):
     assert found.ratio_height == pytest.approx(one.ratio_height, rel=1e-5)
 
 
-@pytest.mark.parametrize(("which", "executor"), [("groups", "processes:2"), ("few strips", "dask:local:2")])
+@pytest.mark.parametrize(("which", "executor"), [("groups", "processes:2"), ("few strips", "processes:2")])
 def test_a_worker_killed_in_mid_run_changes_nothing(which, executor, tmp_path, monkeypatch):
     """Of every kind of task of the model part one is killed, in the same run."""
-    pytest.importorskip("distributed")
     make, parts, _ = BLOCKS[which]
     aerotri.divide(make(), tmp_path / "block", parts=parts)
     aerotri.adjust_parts(tmp_path / "block", tmp_path / "threads", plots=False)

@@ -125,6 +125,8 @@ def _left_out(start: tuple[aerotri.Block, np.ndarray], name: str) -> LeftOut | s
         check = aerotri.adjust(aerotri.edit(block, check=[name]), points=points).adjusted.check
     except aerotri.AdjustmentFailedError as failure:
         return failure.outcome.message
+    if not len(check):
+        return "no photograph here shows it"
     return LeftOut(check.difference[0], check.sigma[0], check.w[0])
 
 

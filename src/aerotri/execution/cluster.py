@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import queue
 import signal
+import time
 import uuid
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
@@ -37,6 +38,8 @@ UNWATCHED = {
 """Environment of such workers: they do not look fifty times a second how fast and where in the program they are."""
 CONNECT_S, LOOK_S = "20s", 5.0
 """For the scheduler to answer; between two looks whether there are workers."""
+GONE_S = 120.0
+"""Without any worker of those that were started here, after which none is expected to come back [C]."""
 
 
 class Dask:
@@ -121,12 +124,27 @@ class Dask:
         return sorted(lost)
 
     def _next(self, done: queue.Queue[Any]) -> Any:
-        """The next task that ended; says so where nobody works."""
+        """The next task that ended; says so where nobody works.
+
+        Raises
+        ------
+        InputError
+            When the workers that were started here have ended, and none comes back.
+        """
+        alone_since = time.monotonic()
         while True:
             try:
                 return done.get(timeout=LOOK_S)
             except queue.Empty:
-                if not self._told_waiting and not self._workers():
+                if self._workers():
+                    alone_since = time.monotonic()
+                    continue
+                if not self._address and time.monotonic() - alone_since > GONE_S:
+                    raise InputError(
+                        "all Dask workers that were started here have ended, and none came back",
+                        "run the command again; with --executor processes:N if it happens again",
+                    ) from None
+                if not self._told_waiting:
                     self._say(f"Dask scheduler {self._client.scheduler.address}: no worker at the moment, waiting")
                     self._told_waiting = True
 
