@@ -55,7 +55,7 @@ def commands(photographs: Path, folder: Path, resolution: str, tying: Sequence[s
         "imgeo": ("imgeo", result, str(photographs)),
         "halves": ("halves", result),
         "adjust in parts": ("adjust", str(folder / "in_parts"), "--no-plots"),
-        "demcor": ("demcor", result, f"{dsm}/dsm.tif", "--pair", ",".join(first_two(folder))),
+        "demcor": ("demcor", result, f"{dsm}/dsm.tif", "--pair", *first_two(folder)),
         "compare-parameters": ("compare-parameters", block, *(word for one in SETS for word in ("--set", one))),
     }
 
