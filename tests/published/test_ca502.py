@@ -14,7 +14,8 @@ TOOL = PROJECT / "tools" / "prove" / "ca502.py"
 
 
 @pytest.fixture
-def tool():
+def tool(monkeypatch):
+    monkeypatch.syspath_prepend(str(TOOL.parent))
     spec = importlib.util.spec_from_file_location("ca502", TOOL)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -28,8 +28,8 @@ from aerotri.volume.settings import METHODS
 EVERYDAY = {
     "a", "and", "are", "as", "at", "between", "beyond", "by", "counted", "covered", "end", "every", "expected", "f",
     "g", "heights", "in", "inside", "lap", "lines", "moved", "nearby", "neighbouring", "not", "of", "over", "place",
-    "distance", "seen", "straight", "that", "the", "them", "to", "warning", "with", "without", "cm", "m", "m²", "m³",
-    "mm", "px", "t/m³", "µm",
+    "distance", "seen", "share", "straight", "that", "the", "them", "to", "warning", "with", "without", "cm", "m", "m²",
+    "m³", "mm", "px", "t/m³", "µm",
 }  # fmt: skip
 """Words of the printed lines that need no explanation: small words, units, parts of terms explained together."""
 PRINTING = (

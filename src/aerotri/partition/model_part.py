@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from aerotri.conventions import InputError
 from aerotri.observations import Block
 from aerotri.partition.course import Course, Place
 from aerotri.partition.model_endings import (
@@ -27,6 +28,7 @@ from aerotri.partition.model_endings import (
 from aerotri.partition.model_tasks import (
     MIX,
     PHOTOGRAPHS,
+    PROBED,
     Described,
     Labelled,
     Probing,
@@ -146,6 +148,8 @@ class _PartsModel:
         q = q.reshape(size, size)
         chosen = weakest(0.5 * (q + q.T) - held)
         self._course.run(score_part, replace(probing, chosen=chosen))
+        for task in self._course.tasks:
+            task.files.drop(PROBED)
         return partial(self._sum_of_squares, chosen.shape[1])
 
     def _sum_of_squares(self, modes: int, clusters: Clusters) -> tuple[float, int]:
@@ -226,6 +230,11 @@ class _PartsModel:
             if turning.lengths is not None and turning.lengths.arrived:
                 break
         solver.drop(before)
+        if turning.lengths is None or not turning.lengths.arrived:
+            raise InputError(
+                f"the model part of σ is not found in {MOST_TURNS} turns",
+                'set model_part = "off" in block.toml for σ without it',
+            )
         return turning
 
 

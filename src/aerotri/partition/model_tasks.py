@@ -164,7 +164,6 @@ def score_part(probing: Probing, task: PartTask) -> None:
     sides = np.ascontiguousarray(_unit_sides(s.system, probing)[2] @ probing.chosen)
     y = Directions(images, shared, expand_sides(s.system, s.state, images, shared, sides, s.estimator))
     task.files.keep_object(MODES, Modes(y, *scores_along(s.system, s, y)))
-    task.files.drop(PROBED)
 
 
 def compare_part(labelled: Labelled, task: PartTask) -> None:

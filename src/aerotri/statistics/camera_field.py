@@ -30,9 +30,11 @@ from aerotri.statistics.cluster_fields import (
     half_format,
     node_counts,
     nodes_at,
+    of_patterns,
 )
 from aerotri.statistics.cluster_test import LEVEL
 from aerotri.statistics.clusters import CAMERA, LARGE, Clusters
+from aerotri.statistics.model_part import why_not
 
 LENGTHS = (0.2, 0.28, 0.4)
 """Correlation lengths looked at, in half diagonals of the format; chosen [C]: longer ones explain the residuals as
@@ -95,33 +97,38 @@ def known_field(found: Adjustment) -> CameraField | None:
 
 
 def is_of_camera(found: Adjustment) -> bool:
-    """Whether the model part of σ is of errors that all photographs share: a field of theirs takes its place."""
+    """Whether the model part of σ is of errors that all photographs of a camera share: a field takes its place."""
     part = found.local.model_part
-    return part is not None and part.counts and part.clusters == 1
+    return part is not None and part.counts and (part.clusters == 1 or part.scheme == CAMERA)
 
 
 def camera_field(found: Adjustment) -> CameraField | None:
-    """The fields; None where the residuals are explained by noise, or the block is too large to look."""
+    """The fields; None where the residuals are explained by noise, or say too little.
+
+    Too little say those of an adjustment without an end, and fewer than twice as many as the field has nodes. A field
+    in a free block would depend on which coordinates hold it: there is none.
+    """
     system, solution, outcome = found.system, found.solution, found.local.outcome
     u = system.unknowns
-    rows = u.block.images.camera[u.images]
-    cameras = np.unique(rows)
-    squares = outcome.sigma0**2 * outcome.redundancy
-    if len(cameras) > MOST_CAMERAS or len(u.images) > LARGE or not squares > 0.0:
+    settings, cameras = u.block.settings.adjustment, np.unique(u.block.images.camera[u.images])
+    if why_not(settings.model_part, len(u.images), solution.status, outcome.sigma0) or settings.is_free:
+        return None
+    if len(cameras) > MOST_CAMERAS or len(u.images) * len(cameras) > LARGE:
         return None
     factor = system.factorise(solution.equations)
     one = Clusters(CAMERA, np.zeros(len(u.images), np.int64), ("",), 1)
     equations = field_equations(system, solution, factor, one)
-    gain, variance, noise, length = _most_likely(found, equations, squares)
+    if outcome.redundancy < 2 * len(equations.scores):
+        return None
+    gain, variance, noise, length = _most_likely(found, equations, outcome.sigma0**2 * outcome.redundancy)
     if np.exp(-0.5 * gain) >= LEVEL:
         return None
     power, patterns = np.linalg.eigh(variance * correlations(u.block.cameras, length, True))
     kept = power > KEPT * power[-1]
     root = patterns[:, kept] * np.sqrt(power[kept])
-    sides = equations.sides.reshape(len(equations.sides), -1, len(root)) @ root
     part = np.full(len(u.block.cameras), -1)
     part[equations.camera] = np.arange(len(equations.camera))
-    by_unknowns = factor.solve(np.ascontiguousarray(sides.reshape(len(sides), -1)))
+    by_unknowns = factor.solve(of_patterns(equations.sides, root))
     by_unknowns[: 6 * len(u.images)] *= u.eo_free.reshape(-1, 1)
     half = np.array([camera.half_format_mm for camera in u.block.cameras])
     return CameraField(

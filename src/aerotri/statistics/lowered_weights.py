@@ -169,7 +169,8 @@ def lengths(of_parts: np.ndarray, before: Lengths | None) -> Lengths:
     if before is not None:
         beta = _ratio(gamma, before.gamma)
         curvature = curvature - _ratio(beta * gamma, before.alpha)
-    goes_on = gamma > SMALL**2 * first
+    # what is no number goes on, so that it is not taken for an end
+    goes_on = ~(gamma <= SMALL**2 * first)
     if before is not None:
         goes_on &= before.alpha != 0.0
     return Lengths(gamma, first, np.where(goes_on, _ratio(gamma, curvature), 0.0), np.where(goes_on, beta, 0.0))

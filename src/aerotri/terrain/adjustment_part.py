@@ -231,13 +231,13 @@ def _by_unknowns(
         there = columns >= 0
         e = -np.einsum("rik,rk->ri", gain[there], effect[there])
         np.add.at(j, (picket[there][:, None], np.arange(3), first_shared + columns[there][:, None]), e)
-    columns = shared_columns(calibration)
+    columns, measured = shared_columns(calibration), rays.prediction.copy()
     if len(error_rows(calibration)):
         for g, errors in enumerate(restitution.errors):
             has = np.flatnonzero(restitution.group[image] == g)
             if len(has):
-                partials = errors.partials(errors.measured(rays.prediction[has]))
-                e = -gain[has] @ partials
+                measured[has] = errors.measured(rays.prediction[has])
+                e = -gain[has] @ errors.partials(measured[has])
                 for k, col in enumerate(columns.tolist()):
                     np.add.at(j, (picket[has][:, None], np.arange(3), first_shared + col), e[:, :, k])
     left = restitution.left
@@ -245,5 +245,5 @@ def _by_unknowns(
         return j
     by_errors = np.zeros((len(local), 3, left.by_unknowns.shape[1]))
     camera = calibration.local.block.images.camera[image]
-    np.add.at(by_errors, picket, left.moved(gain, rays.prediction, camera))
+    np.add.at(by_errors, picket, left.moved(gain, measured, camera))
     return np.concatenate([j, by_errors], axis=2)

@@ -270,7 +270,8 @@ def photographs_of(
         For scanned film, whose pixels are no image coordinates, and for photographs without orientation.
     """
     block = calibration.local.block
-    restitution = replace(restitution_of(calibration, FREE), left=known_field(calibration))
+    # what is left of errors cancels against parameters at the rays, which photographs freed of errors do not have
+    restitution = replace(restitution_of(calibration, FREE), left=None if ideal else known_field(calibration))
     for row, path in zip(rows.tolist(), paths, strict=True):
         if row in block.interior_fits:
             raise InputError("is scanned film, which matching does not read", "resample it to its fiducials", path)
