@@ -1,6 +1,7 @@
 """What parameters leave of a camera's errors: found in residuals, and in σ of what is measured with the orientation."""
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from aerotri.observations import Block
 from aerotri.pipeline.chain import adjust_keeping_system
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.truth import Truth
-from aerotri.statistics.camera_field import CameraField, camera_field
+from aerotri.statistics.camera_field import CameraField, camera_field, known_field
 from aerotri.statistics.cluster_fields import Field, half_format, node_counts, root_of_field
 from aerotri.statistics.clusters import Clusters
 from aerotri.terrain.adjustment_part import variances_at
@@ -88,11 +89,13 @@ def test_what_lens_parameters_leave_is_in_sigma_of_points_measured_later():
     assert 0.6 < np.sqrt(np.mean(after)) < 1.4
 
 
-def test_a_volume_has_the_part_that_its_places_have():
+def test_a_volume_has_the_part_that_its_places_have(monkeypatch):
     """A functional that is the height of one place: its model part is that of the place, by other code."""
     found = adjust_keeping_system(simulated(3, "brown:K1+K2", 5.0)[0])
     block, left = found.local.block, camera_field(found)
     assert left is not None
+    # the block has no model part, so that only the field is compared
+    monkeypatch.setattr(import_module("aerotri.volume.response"), "known_field", lambda _: left)
     tie = np.setdiff1d(np.flatnonzero(found.local.points.rays >= 3), block.control.point)[:5]
     xyz, seen = found.result.points.xyz[tie], rays_of(block, tie)
     same_noise = replace(left, noise=found.local.outcome.sigma0)
@@ -148,3 +151,7 @@ class _AlongX(CameraField):
         changed = super().moved(gain, xy, camera)
         changed[:, :, 1:] = 0.0
         return changed
+
+
+def test_a_field_that_is_switched_off_is_not_found():
+    assert known_field(adjust_keeping_system(simulated(1, "brown:K1", 5.0)[0])) is None

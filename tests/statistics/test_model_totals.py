@@ -1,6 +1,7 @@
 """Totals with the model part: functions of the unknowns, joint covariances, interior orientation, deformation."""
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -95,7 +96,7 @@ def test_volume_has_a_part_of_the_model(moving, resting, monkeypatch):
 
     But for what all photographs of the camera share, which is a part of its own.
     """
-    monkeypatch.setattr("aerotri.volume.response.known_field", lambda found: None)
+    monkeypatch.setattr(import_module("aerotri.volume.response"), "known_field", lambda _: None)
     for found in (moving, resting):
         xy = found.result.points.xyz[::40]
         pickets, seen = pickets_where_seen(found, xy, 1e-3)

@@ -90,7 +90,9 @@ class CameraField:
 
 
 def known_field(found: Adjustment) -> CameraField | None:
-    """As `camera_field`, found once for an adjustment while it is in use."""
+    """As `camera_field`, found once for an adjustment while it is in use; None where the model part is switched off."""
+    if found.system.unknowns.block.settings.adjustment.model_part == "off":
+        return None
     if found not in _KNOWN:
         _KNOWN[found] = camera_field(found)
     return _KNOWN[found]
@@ -110,8 +112,8 @@ def camera_field(found: Adjustment) -> CameraField | None:
     """
     system, solution, outcome = found.system, found.solution, found.local.outcome
     u = system.unknowns
-    settings, cameras = u.block.settings.adjustment, np.unique(u.block.images.camera[u.images])
-    if why_not(settings.model_part, len(u.images), solution.status, outcome.sigma0) or settings.is_free:
+    cameras = np.unique(u.block.images.camera[u.images])
+    if why_not("", len(u.images), solution.status, outcome.sigma0) or u.block.settings.adjustment.is_free:
         return None
     if len(cameras) > MOST_CAMERAS or len(u.images) * len(cameras) > LARGE:
         return None
