@@ -73,7 +73,7 @@ def main() -> None:
     plan.axhline(y[row], color="#0b5cad", lw=0.8)
     plan.set_xlabel("X [m]")
     plan.set_ylabel("Y [m]")
-    figure.colorbar(image, ax=plan, label="σ of matching [m]; white: not measured")
+    figure.colorbar(image, ax=plan, label="σ of matching [m]")
     for axes in (section, plan):
         axes.spines[["top", "right"]].set_visible(False)
     FIGURE.parent.mkdir(exist_ok=True)
