@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import signal
 from collections import deque
-from collections.abc import Generator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from types import TracebackType
 from typing import Any, Self
 
 from aerotri.conventions import InputError
+from aerotri.execution.beginning import environment_of, method, prepare_copies
 from aerotri.execution.elsewhere import ONE_THREAD, outcome_in, parcels, perform
 from aerotri.execution.work import MOST_TRIES, Ledger, Outcome, R, Report, S, T, Work
 from aerotri.memory import refuse_beyond_memory
@@ -36,6 +35,8 @@ class Processes:
         self._workers: list[_Worker] = []
 
     def __enter__(self) -> Self:
+        # importing takes seconds: meanwhile the command reads its files
+        prepare_copies(ONE_THREAD)
         return self
 
     def __exit__(
@@ -124,12 +125,12 @@ class _Worker:
     """A process, the line to it, and the number of the task that it does; None where it has none."""
 
     def __init__(self) -> None:
-        context = get_context("spawn")
+        context = get_context(method())
         self.connection, other = context.Pipe()
         self.task: int | None = None
         self.is_ready = False
-        self._process: SpawnProcess = context.Process(target=_serve, args=(other,), daemon=True)
-        with _environment(ONE_THREAD):
+        self._process: BaseProcess = context.Process(target=_serve, args=(other,), daemon=True)
+        with environment_of(ONE_THREAD):
             self._process.start()
         other.close()
 
@@ -163,18 +164,3 @@ def _serve(connection: Connection) -> None:
         connection.send_bytes(READY)
         while True:
             connection.send_bytes(perform(connection.recv_bytes()))
-
-
-@contextmanager
-def _environment(values: dict[str, str]) -> Generator[None]:
-    """The variables set while a process is started, which takes them over."""
-    before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
