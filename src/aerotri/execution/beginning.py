@@ -10,7 +10,9 @@ import os
 import sys
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
-from typing import Literal
+from multiprocessing import get_context
+from multiprocessing.context import SpawnContext
+from typing import Literal, cast
 
 PACKAGE = __name__.partition(".")[0]
 Method = Literal["forkserver", "spawn"]
@@ -19,6 +21,11 @@ Method = Literal["forkserver", "spawn"]
 def method() -> Method:
     """How multiprocessing is to begin processes here."""
     return "forkserver" if sys.platform == "linux" else "spawn"
+
+
+def context() -> SpawnContext:
+    """What begins them so; all contexts have the same functions."""
+    return cast(SpawnContext, get_context(method()))
 
 
 def prepare_copies(environment: Mapping[str, str], also: tuple[str, ...] = ()) -> None:

@@ -164,7 +164,7 @@ class Dask:
                     self._told_waiting = True
 
     def _replace_lost(self) -> None:
-        """Begin others in place of those started here that Dask has given up: it does so with one killed as it begins."""
+        """Begin others for those started here that Dask has given up, such as one that was killed as it began."""
         if self._starting is not None and len(self._workers()) < self._count:
             self._starting.result()[0].scale(self._count)
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import signal
 from collections import deque
 from contextlib import suppress
-from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from types import TracebackType
 from typing import Any, Self
 
 from aerotri.conventions import InputError
-from aerotri.execution.beginning import environment_of, method, prepare_copies
+from aerotri.execution.beginning import context, environment_of, prepare_copies
 from aerotri.execution.elsewhere import ONE_THREAD, outcome_in, parcels, perform
 from aerotri.execution.work import MOST_TRIES, Ledger, Outcome, R, Report, S, T, Work
 from aerotri.memory import refuse_beyond_memory
@@ -125,11 +124,11 @@ class _Worker:
     """A process, the line to it, and the number of the task that it does; None where it has none."""
 
     def __init__(self) -> None:
-        context = get_context(method())
-        self.connection, other = context.Pipe()
+        begin = context()
+        self.connection, other = begin.Pipe()
         self.task: int | None = None
         self.is_ready = False
-        self._process: BaseProcess = context.Process(target=_serve, args=(other,), daemon=True)
+        self._process: BaseProcess = begin.Process(target=_serve, args=(other,), daemon=True)
         with environment_of(ONE_THREAD):
             self._process.start()
         other.close()
