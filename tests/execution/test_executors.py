@@ -12,8 +12,9 @@ from functools import partial
 import pytest
 import toy_tasks
 
+from aerotri import memory
 from aerotri.conventions import InputError
-from aerotri.execution.choice import Choice, chosen
+from aerotri.execution.choice import Choice, chosen, fewer_than
 from aerotri.execution.opening import opened
 from aerotri.execution.work import TasksFailedError, Work
 
@@ -108,7 +109,7 @@ def test_a_worker_has_one_thread_and_is_another_process(text, executor, work):
 @pytest.mark.parametrize("text", APART)
 def test_more_memory_than_there_is_is_refused(text, executor, tmp_path):
     work = Work(toy_tasks.squared, 0, [1, 2], ["a", "b"], "tiles", tmp_path, 10**15)
-    with pytest.raises(InputError, match=r"2 tiles at once need .* give fewer"):
+    with pytest.raises(InputError, match=r"2 tiles at once need .* free memory, or take another machine"):
         executor(text).run(work)
 
 
@@ -140,12 +141,12 @@ def test_what_runs_where_is_understood():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("thread", "'thread' is no executor — give threads, processes:N, dask:ADDRESS or dask:local:N"),
-        ("dask", "'dask' is no executor — give threads"),
-        ("threads:2", "'threads:2' is no executor"),
-        ("processes", "'' is no number of processes — give a whole number of 1 or more, such as processes:4"),
-        ("processes:0", "'0' is no number of processes"),
-        ("processes:two", "'two' is no number of processes"),
+        ("thread", "'thread' is not an executor — give threads, processes:N, dask:ADDRESS or dask:local:N"),
+        ("dask", "'dask' is not an executor — give threads"),
+        ("threads:2", "'threads:2' is not an executor"),
+        ("processes", "'' is not a number of processes — give a whole number of 1 or more, such as processes:4"),
+        ("processes:0", "'0' is not a number of processes"),
+        ("processes:two", "'two' is not a number of processes"),
         ("dask:local:0", "such as dask:local:4"),
         ("dask:local", "such as dask:local:4"),
     ],
@@ -232,3 +233,9 @@ def test_an_interruption_before_the_work_begins_is_quiet():
             os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == 130
     assert said.decode() == ""
+
+
+def test_remedy_says_how_many_tasks_fit(monkeypatch):
+    monkeypatch.setattr(memory, "available_bytes", lambda: 10 * 2**30)
+    assert fewer_than(8, 3 * 2**30, "processes") == "give at most 2 processes"
+    assert fewer_than(2, 20 * 2**30, "workers") == "free memory, or take another machine"

@@ -22,6 +22,7 @@ from distributed.scheduler import KilledWorker
 
 from aerotri.conventions import InputError
 from aerotri.execution.beginning import method, prepare_copies
+from aerotri.execution.choice import fewer_than
 from aerotri.execution.elsewhere import ONE_THREAD, outcome_in, parcels, perform
 from aerotri.execution.work import MOST_TRIES, Ledger, Outcome, R, Report, S, Say, T, Work
 from aerotri.memory import SHARE, available_bytes, refuse_beyond_memory
@@ -86,7 +87,7 @@ class Dask:
         if not self._address:
             count = min(self._count, len(work.tasks))
             refuse_beyond_memory(
-                count * work.bytes_each, f"{count} {work.what} at once", "give fewer workers, {share} times as many"
+                count * work.bytes_each, f"{count} {work.what} at once", fewer_than(count, work.bytes_each, "workers")
             )
             if self._client is None and self._starting is not None:
                 _, self._client = self._starting.result()

@@ -12,6 +12,7 @@ from typing import Any, Self
 
 from aerotri.conventions import InputError
 from aerotri.execution.beginning import context, environment_of, prepare_copies
+from aerotri.execution.choice import fewer_than
 from aerotri.execution.elsewhere import ONE_THREAD, outcome_in, parcels, perform
 from aerotri.execution.work import MOST_TRIES, Ledger, Outcome, R, Report, S, T, Work
 from aerotri.memory import refuse_beyond_memory
@@ -49,7 +50,7 @@ class Processes:
         """See `work.Executor`."""
         count = min(self._count, len(work.tasks))
         refuse_beyond_memory(
-            count * work.bytes_each, f"{count} {work.what} at once", "give fewer processes, {share} times as many"
+            count * work.bytes_each, f"{count} {work.what} at once", fewer_than(count, work.bytes_each, "processes")
         )
         with parcels(work) as waiting:
             return _Run(work, waiting, self._workers, count, report).values()
