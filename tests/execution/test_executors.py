@@ -14,6 +14,7 @@ import toy_tasks
 
 from aerotri import memory
 from aerotri.conventions import InputError
+from aerotri.execution import processes
 from aerotri.execution.choice import Choice, chosen, fewer_than
 from aerotri.execution.opening import opened
 from aerotri.execution.work import TasksFailedError, Work
@@ -102,8 +103,19 @@ def test_a_worker_has_one_thread_and_is_another_process(text, executor, work):
     import os
 
     found = executor(text).run(work(toy_tasks.environment))
-    assert {threads for threads, _ in found} == {"1"}
-    assert os.getpid() not in {process for _, process in found}
+    assert {threads for threads, _, _ in found} == {"1"}
+    assert os.getpid() not in {process for _, process, _ in found}
+
+
+@pytest.mark.parametrize("text", APART)
+def test_a_worker_has_the_environment_of_its_beginning(text, work, monkeypatch):
+    """Workers are copies of a process that may have been begun before it was changed."""
+    if text.startswith("dask"):
+        pytest.importorskip("distributed")
+    for value in ("first", "second"):
+        monkeypatch.setenv("AEROTRI_OF_TEST", value)
+        with opened(text) as executor:
+            assert {own for _, _, own in executor.run(work(toy_tasks.environment))} == {value}
 
 
 @pytest.mark.parametrize("text", APART)
@@ -239,3 +251,25 @@ def test_remedy_says_how_many_tasks_fit(monkeypatch):
     monkeypatch.setattr(memory, "available_bytes", lambda: 10 * 2**30)
     assert fewer_than(8, 3 * 2**30, "processes") == "give at most 2 processes"
     assert fewer_than(2, 20 * 2**30, "workers") == "free memory, or take another machine"
+
+
+def test_a_process_killed_as_it_begins_is_begun_again(work, monkeypatch):
+    """Once; one that never begins ends the work."""
+    begun = []
+
+    class Killed(processes._Worker):
+        def __init__(self):
+            super().__init__()
+            begun.append(self)
+            if len(begun) <= kills:
+                os.kill(self._process.pid, signal.SIGKILL)
+
+    monkeypatch.setattr(processes, "_Worker", Killed)
+    kills = 1
+    with processes.Processes(1) as executor:
+        assert executor.run(work(toy_tasks.squared, shared=0, count=2)) == [0, 1]
+    assert len(begun) == 2
+    begun.clear()
+    kills = 100
+    with processes.Processes(1) as executor, pytest.raises(InputError, match="a process could not be started"):
+        executor.run(work(toy_tasks.squared, shared=0, count=2))

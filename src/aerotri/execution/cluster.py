@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import queue
 import signal
 import time
@@ -176,7 +177,7 @@ class Dask:
         memory: dict[str, Any] = {} if there is None else {"resources": {MEMORY: SHARE * there / self._count}}
         cluster = LocalCluster(
             n_workers=self._count, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
-            silence_logs=logging.CRITICAL, env={**ONE_THREAD, **UNWATCHED}, **memory,
+            silence_logs=logging.CRITICAL, env={**os.environ, **ONE_THREAD, **UNWATCHED}, **memory,
         )  # fmt: skip
         client = Client(cluster)
         client.register_plugin(_NotInterrupted())

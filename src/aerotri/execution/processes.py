@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections import deque
 from contextlib import suppress
@@ -66,6 +67,7 @@ class _Run:
         self._ledger: Ledger[Any] = Ledger(work, report)
         self._left = deque(range(len(parcels)))
         self._begun = [0] * len(parcels)
+        self._never_ready = 0
 
     def values(self) -> list[Any]:
         """Results in the order of the tasks."""
@@ -97,7 +99,7 @@ class _Run:
             self._lost(worker)
             return
         if content == READY:
-            worker.is_ready = True
+            worker.is_ready, self._never_ready = True, 0
             return
         task, worker.task = worker.task, None
         assert task is not None
@@ -108,6 +110,8 @@ class _Run:
         self._workers.remove(worker)
         ending = worker.end(at_once=False)
         if not worker.is_ready:
+            self._never_ready += 1
+        if self._never_ready >= MOST_TRIES:
             raise InputError(
                 f"a process could not be started ({ending})",
                 "see the lines above; a script begins its work under: if __name__ == '__main__':",
@@ -129,7 +133,8 @@ class _Worker:
         self.connection, other = begin.Pipe()
         self.task: int | None = None
         self.is_ready = False
-        self._process: BaseProcess = begin.Process(target=_serve, args=(other,), daemon=True)
+        environment = {**os.environ, **ONE_THREAD}
+        self._process: BaseProcess = begin.Process(target=_serve, args=(other, environment), daemon=True)
         with environment_of(ONE_THREAD):
             self._process.start()
         other.close()
@@ -155,8 +160,11 @@ def wait_for(workers: list[_Worker]) -> list[_Worker]:
     return [worker for worker in workers if worker.connection in heard]
 
 
-def _serve(connection: Connection) -> None:
+def _serve(connection: Connection, environment: dict[str, str]) -> None:
     """What a process does: task after task, until the line is closed."""
+    # the process that this is a copy of may have been begun in another environment
+    os.environ.clear()
+    os.environ.update(environment)
     # an interrupt of the terminal reaches all processes; ours ends the others
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
