@@ -144,7 +144,7 @@ def _robust(a: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if a.shape[1]:
             values = np.linalg.svd(a[used] / np.linalg.norm(a[used], axis=0), compute_uv=False)
             if not values[-1] > 1e-6:
-                raise InputError("stable ground does not tell how the surface is shifted", "give --align height")
+                raise InputError("the stable ground is too level to determine a shift", "give --align height")
             x = np.linalg.lstsq(a[used], d[used], rcond=None)[0]
         left = d - a @ x
         centre = np.median(left[used]) if not a.shape[1] else 0.0
