@@ -145,5 +145,5 @@ def test_the_user_gives_two_results(proof):
     assert any("one adjustment" in text for text in found.warnings)
     with pytest.raises(InputError, match="given alone"):
         aerotri.cloud_change(xyz, xyz, cylinder=30.0, first_adjustment=result)
-    with pytest.raises(InputError, match="no photograph of its adjustment sees the first cloud"):
+    with pytest.raises(InputError, match="no two photographs of its adjustment see the first cloud"):
         aerotri.cloud_change(xyz + 1e5, xyz + 1e5, cylinder=30.0, first_adjustment=result, second_adjustment=result)

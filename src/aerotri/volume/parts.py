@@ -118,7 +118,10 @@ def part_of_cells(
         calibration, functional.xyz, matching_sigma_mm(calibration, options), per_point, functional.noise_share
     )
     if not seen.any():
-        raise InputError("no photograph of the adjustment sees the surface", "check the CRS of surface and block")
+        raise InputError(
+            "no two photographs of the adjustment see the surface from different places",
+            "check the CRS of surface and block",
+        )
     sharing = cells_sharing(length, surface.grid.cell_x * surface.grid.cell_y)
     pickets = replace(pickets, noise_share=sharing * shares_of_noise(calibration, pickets, functional.take(seen)))
     response = respond(calibration, pickets, functional.gradient[seen], options.corrected)

@@ -11,11 +11,15 @@ from aerotri.deformation.orientation import Orientation, calibrated_orientation
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.observations import Block
 from aerotri.results.adjustment import Adjustment
+from aerotri.terrain.dense.pairs import LEAST_ANGLE
 from aerotri.volume import _response_kernels as _kernels
 from aerotri.volume.settings import MOST_PER_POINT, PER_POINT
 
 CANDIDATES_EVERY = 64
 """Points of a row that share one list of photographs to look into."""
+WEAKEST_ANGLE = 0.5
+"""Degrees between two rays at least, where no pair has the angle that dense matching asks for [C]: a narrow lens has
+such pairs, the heads of one camera station and photographs of a hovering drone have not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +96,10 @@ def pickets_where_seen(
     calibration: Adjustment, xyz: np.ndarray, sigma_mm: float, per_point: int | np.ndarray = PER_POINT,
     noise_share: np.ndarray | None = None,
 ) -> tuple[Pickets, np.ndarray]:  # fmt: skip
-    """Pickets at places of a surface, in the photographs nearest to them that see them.
+    """Pickets at places of a surface, in the photographs nearest to them that see them from different places.
+
+    The nearest photograph is taken with the nearest of those whose rays make `LEAST_ANGLE` with its own. A place that
+    is seen from one place only, as by the heads of one camera station, is not seen by enough.
 
     Parameters
     ----------
@@ -119,7 +126,7 @@ def pickets_where_seen(
             np.ascontiguousarray(orientation.rotation), np.ascontiguousarray(orientation.centre),
             np.ascontiguousarray(orientation.interior), half,
         ),
-        chosen,
+        np.radians(LEAST_ANGLE), np.radians(WEAKEST_ANGLE), chosen,
     )  # fmt: skip
     used = np.minimum((chosen >= 0).sum(axis=1), wanted)
     seen = used >= (PER_POINT if each else per_point)

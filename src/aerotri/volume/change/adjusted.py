@@ -185,7 +185,7 @@ def adjusted_pair(
     Raises
     ------
     InputError
-        When no photograph of an adjustment sees its surface.
+        When no two photographs of an adjustment see its surface from different places.
     """
     known = np.isfinite(heights[0]) & np.isfinite(heights[1])
     factor = max(1, int(np.ceil(max(known.shape) / MOST_BLOCKS)))
@@ -211,7 +211,10 @@ def _epoch(
     per_point = PER_POINT if photographs is None else photographs_at(photographs, own)
     pickets, seen = pickets_where_seen(calibration, own, 1e-3 * calibration.local.outcome.sigma0_um, per_point)
     if not seen.any():
-        raise InputError(f"no photograph of its adjustment sees {name}", "check which result belongs to it")
+        raise InputError(
+            f"no two photographs of its adjustment see {name} from different places",
+            "check which result belongs to it",
+        )
     every = np.zeros(len(count), bool)
     every[np.flatnonzero(filled)[seen]] = True
     slope = np.stack([np.where(known & np.isfinite(along), along, 0.0) for along in slopes_of(grid, z)])

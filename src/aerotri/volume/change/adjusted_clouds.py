@@ -54,7 +54,7 @@ def adjusted_distances(
     Raises
     ------
     InputError
-        When no photograph of an adjustment sees its cloud.
+        When no two photographs of an adjustment see its cloud from different places.
     """
     rows = _places(found)
     first, second = found.core[rows], found.core[rows] + found.distance[rows, None] * found.normal[rows]
@@ -113,7 +113,10 @@ def _measured(xyz: np.ndarray, cloud: Cloud, calibration: Adjustment, name: str)
         per_point = cloud.photographs[KDTree(cloud.xyz).query(xyz)[1]].astype(np.int64)
     pickets, seen = pickets_where_seen(calibration, xyz, 1e-3 * calibration.local.outcome.sigma0_um, per_point)
     if not seen.any():
-        raise InputError(f"no photograph of its adjustment sees {name}", "check which result belongs to it")
+        raise InputError(
+            f"no two photographs of its adjustment see {name} from different places",
+            "check which result belongs to it",
+        )
     return pickets, seen
 
 
