@@ -1,7 +1,8 @@
 """What the adjustment adds to the variance of pickets: they are intersected with an orientation that has its own σ.
 
 [D] The ideal rays l = m − d(m; p) of a picket give dP = −G·(∂π/∂θ·dθ + ∂d/∂p·dp), G = (AᵀA)⁻¹Aᵀ of its intersection.
-With J = dP/dx over all unknowns x of the reduced system its covariance is σ̂0²·J·Q·Jᵀ, by a solution with the factor.
+With J = dP/dx over all unknowns x of the reduced system its covariance is σ̂0²·J·Q·Jᵀ, by a solution with the factor;
+in the inner datum of a free block where the block has it, as its points.
 Where groups of photographs share errors it has a model part. Where the residuals show that the parameters leave image
 errors it has the part of these, through the orientation and at the rays of the picket itself
 (`statistics.camera_field`). It changes slowly over the ground: some pickets tell it for all.
@@ -20,6 +21,7 @@ from aerotri.deformation.restitution import Restitution
 from aerotri.functional_model.collinearity import RayPartials, linearise
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.camera_field import CameraField, is_of_camera
+from aerotri.statistics.covariance import inner_datum, is_inner
 from aerotri.statistics.model_of_functions import model_of_functions
 from aerotri.terrain.pickets import Pickets
 
@@ -133,9 +135,10 @@ def _covariances(
     left : what the parameters leave of image errors. local : (n, 3) m in the frame.
     partials : (k, size, u + f) of some places, by the unknowns of the reduced system, then by the patterns of `left`.
     """
-    frame = places_of(calibration)
-    factor = calibration.system.factorise(calibration.solution.equations)
-    count = 6 * len(calibration.system.unknowns.images) + len(calibration.system.unknowns.shared)
+    system, solution = calibration.system, calibration.solution
+    frame, factor = places_of(calibration), system.factorise(solution.equations)
+    inner = inner_datum(system, solution.state, factor, solution.estimator) if is_inner(system) else None
+    count = 6 * len(system.unknowns.images) + len(system.unknowns.shared)
     covariances = np.empty((len(local), size, size))
     for first in range(0, len(local), AT_A_TIME):
         part = slice(first, first + AT_A_TIME)
@@ -143,10 +146,12 @@ def _covariances(
         by_columns = np.ascontiguousarray(j.reshape(-1, count).T)
         q = factor.solve(by_columns)
         both = np.einsum("nau,unb->nab", j, q.reshape(count, len(j), size))
+        if inner is not None:
+            both = both + inner.correction(by_columns, size)
         covariance = (calibration.local.outcome.sigma0 if left is None else left.noise) ** 2 * both
         if calibration.model is not None and not (left is not None and is_of_camera(calibration)):
             covariance = covariance + model_of_functions(
-                calibration.system, calibration.solution, calibration.model, by_columns, q, size
+                system, solution, calibration.model, by_columns, q, size, None if inner is None else both
             )
         if left is not None:
             by_errors = by_errors + j @ left.by_unknowns

@@ -23,7 +23,6 @@ from aerotri.adjustment import scanning
 from aerotri.adjustment.kernel_records import Scans
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.point_sides import expand_sides
-from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.conventions import InputError
 from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials
 from aerotri.deformation.error_parameters import KINDS, error_rows, shared_columns
@@ -36,7 +35,7 @@ from aerotri.image_errors.tile_grid import Tile, tiles_of
 from aerotri.observations import Block, Camera
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.camera_field import CameraField, is_of_camera, known_field
-from aerotri.statistics.covariance import inner_datum
+from aerotri.statistics.covariance import inner_datum, is_inner
 from aerotri.statistics.model_of_functions import model_of_functions
 from aerotri.volume import _response_kernels as _kernels
 from aerotri.volume.pickets import Pickets
@@ -129,8 +128,9 @@ def respond(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, cor
     factor = system.factorise(calibration.solution.equations)
     solved = factor.solve(c)
     cofactor = float(c @ solved)
-    if u.block.settings.adjustment.datum == "inner" and u.motions.count:
-        cofactor += _inner_correction(calibration, factor, c)
+    if is_inner(system):
+        inner = inner_datum(system, state, factor, calibration.solution.estimator)
+        cofactor += float(inner.correction(c[:, None])[0, 0, 0])
     variance = calibration.local.outcome.sigma0**2 * cofactor
     model, left = 0.0, known_field(calibration)
     if left is not None:
@@ -281,17 +281,6 @@ def _in_unknowns(
     if not corrected:
         shared[np.isin(kinds, KINDS)] = 0.0
     return np.concatenate([(turned * u.eo_free).ravel(), shared])
-
-
-def _inner_correction(calibration: Adjustment, factor: Factor, c: np.ndarray) -> float:
-    """What leads from the cofactor in the minimal datum to that in the inner one, see `statistics.covariance`."""
-    system, solution = calibration.system, calibration.solution
-    inner = inner_datum(system, solution.state, factor, solution.estimator)
-    n = 6 * len(system.unknowns.images)
-    images, shared = c[:n].reshape(-1, 6), c[n:]
-    moved = np.einsum("nid,ni->d", inner.images, images) + inner.shared.T @ shared
-    known = np.einsum("nid,ni->d", inner.q_images, images) + inner.q_shared.T @ shared
-    return float(moved @ inner.both @ moved - 2.0 * moved @ known)
 
 
 def _nodes_of(errors: tuple[PhotoErrors, ...]) -> _Nodes:
