@@ -13,12 +13,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from aerotri.deformation.error_parameters import error_rows, shared_columns
 from aerotri.deformation.model_grid import places_of
 from aerotri.deformation.restitution import Restitution
 from aerotri.functional_model.collinearity import RayPartials, linearise
+from aerotri.rasters.between_places import between_places, lattice_of, spread_places
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.camera_field import CameraField, is_of_camera
 from aerotri.statistics.covariance import inner_datum, is_inner
@@ -37,19 +37,18 @@ def adjustment_variances(
 
     Parameters
     ----------
-    of : the restitution the pickets were measured with. rows : photographs of the block that `pickets.photographs`
+    restitution : with which the pickets were measured. rows : photographs of the block that `pickets.photographs`
         counts.
     """
     measured = np.flatnonzero(np.isfinite(pickets.xyz).all(axis=1))
     out = np.full(pickets.xyz.shape, np.nan)
-    if len(measured) < 4:
+    if not len(measured):
         return out
-    places = measured[:: max(len(measured) // MOST_PLACES, 1)]
+    plan, places = pickets.xyz[measured, :2], measured
+    if len(measured) > MOST_PLACES:
+        places = measured[spread_places(plan, lattice_of(plan, MOST_PLACES))]
     variances = variances_at(calibration, restitution, rows, pickets.xyz[places], pickets.photographs[places])
-    at = pickets.xyz[places, :2]
-    values = NearestNDInterpolator(at, variances)(pickets.xyz[measured, :2])
-    linear = LinearNDInterpolator(at, variances)(pickets.xyz[measured, :2])
-    out[measured] = np.where(np.isfinite(linear), linear, values)
+    out[measured] = between_places(pickets.xyz[places, :2], variances, plan)
     return out
 
 

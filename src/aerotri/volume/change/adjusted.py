@@ -12,11 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.ndimage import map_coordinates
-from scipy.spatial import KDTree
 
 from aerotri.conventions import InputError
+from aerotri.rasters.between_places import between_places, spread_places
 from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume.bases import Surface
@@ -222,12 +221,9 @@ def _epoch(
 
 
 def _places(known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of known cells, spread over all of them: those nearest to the nodes of a lattice."""
+    """Rows and columns of known cells, spread over all of them."""
     rows, columns = np.nonzero(known)
-    at_row = np.linspace(rows.min(), rows.max(), PLACES)
-    at_column = np.linspace(columns.min(), columns.max(), PLACES)
-    wanted = np.stack(np.meshgrid(at_row, at_column, indexing="ij"), axis=-1).reshape(-1, 2)
-    chosen = np.unique(KDTree(np.column_stack([rows, columns])).query(wanted)[1])
+    chosen = spread_places(np.column_stack([rows, columns]).astype(float), (PLACES, PLACES))
     return rows[chosen], columns[chosen]
 
 
@@ -236,10 +232,6 @@ def _between(shape: tuple[int, ...], rows: np.ndarray, columns: np.ndarray, valu
     nodes = [np.linspace(0.0, max(n - 1, 1), 2 * PLACES) for n in shape]
     at = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 2)
     own = np.column_stack([rows, columns]).astype(float)
-    table = NearestNDInterpolator(own, values)(at)
-    if len(own) > 3 and np.linalg.matrix_rank(own - own.mean(axis=0)) == 2:
-        linear = LinearNDInterpolator(own, values)(at)
-        table = np.where(np.isfinite(linear), linear, table)
-    table = table.reshape(2 * PLACES, 2 * PLACES)
+    table = between_places(own, values, at).reshape(2 * PLACES, 2 * PLACES)
     row, column = (np.arange(n) * (2 * PLACES - 1) / max(n - 1, 1) for n in shape)
     return map_coordinates(table, np.meshgrid(row, column, indexing="ij"), order=1, mode="nearest")

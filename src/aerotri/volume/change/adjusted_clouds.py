@@ -11,10 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.spatial import KDTree
 
 from aerotri.conventions import InputError
+from aerotri.rasters.between_places import between_places, spread_places
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume.change.adjusted import in_common, variances_of_difference
 from aerotri.volume.change.clouds import Cloud, CloudDistances, quadratic
@@ -75,7 +75,9 @@ def adjusted_distances(
             alone = [part.response.variance + part.response.model for part in (one, two)]
             values[k, :, d] = sum(variances_of_difference(one, two)), *alone
             words = words or in_common(one, two, NAMES)
-    covariance = _between(found.core[rows][seen], _elements(values).reshape(len(values), -1), found.core)
+    covariance = between_places(
+        found.core[rows][seen, :2], _elements(values).reshape(len(values), -1), found.core[:, :2]
+    )
     difference, *own = (quadratic(part, found.normal) for part in np.split(covariance, 3, axis=1))
     return AdjustedDistances(np.maximum(difference, 0.0), np.maximum(np.stack(own, axis=1), 0.0), words)
 
@@ -100,10 +102,7 @@ def with_adjustments(found: CloudDistances, clouds: tuple[Cloud, Cloud], adjuste
 def _places(found: CloudDistances) -> np.ndarray:
     """Rows of places with a distance, spread over all of them in plan."""
     rows = np.flatnonzero(np.isfinite(found.distance))
-    plan = found.core[rows, :2]
-    nodes = [np.linspace(low, high, PLACES) for low, high in zip(plan.min(axis=0), plan.max(axis=0), strict=True)]
-    wanted = np.stack(np.meshgrid(*nodes), axis=-1).reshape(-1, 2)
-    return rows[np.unique(KDTree(plan).query(wanted)[1])]
+    return rows[spread_places(found.core[rows, :2], (PLACES, PLACES))]
 
 
 def _measured(xyz: np.ndarray, cloud: Cloud, calibration: Adjustment, name: str) -> tuple[Pickets, np.ndarray]:
@@ -132,14 +131,3 @@ def _elements(values: np.ndarray) -> np.ndarray:
     own = values[..., :3]
     mixed = [0.5 * (values[..., 3 + k] - own[..., i] - own[..., j]) for k, (i, j) in enumerate(PAIRS)]
     return np.concatenate([own, np.stack(mixed, axis=-1)], axis=-1)
-
-
-def _between(places: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Values (p, m) at places (p, 3), linear between them in plan, at (k, 3); beyond them those of the nearest."""
-    plan = places[:, :2] - places[:, :2].mean(axis=0)
-    wanted = at[:, :2] - places[:, :2].mean(axis=0)
-    out = np.asarray(NearestNDInterpolator(plan, values)(wanted))
-    if len(plan) > 3 and np.linalg.matrix_rank(plan) == 2:
-        linear = np.asarray(LinearNDInterpolator(plan, values)(wanted))
-        out = np.where(np.isfinite(linear), linear, out)
-    return out
