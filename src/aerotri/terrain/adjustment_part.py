@@ -16,8 +16,9 @@ import numpy as np
 
 from aerotri.deformation.error_parameters import error_rows, shared_columns
 from aerotri.deformation.model_grid import places_of
+from aerotri.deformation.orientation import Orientation
 from aerotri.deformation.restitution import Restitution
-from aerotri.functional_model.collinearity import RayPartials, linearise
+from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, RayPartials, linearise
 from aerotri.rasters.between_places import between_places, lattice_of, spread_places
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.camera_field import CameraField, is_of_camera
@@ -28,6 +29,8 @@ from aerotri.terrain.pickets import Pickets
 MOST_PLACES, AT_A_TIME = 500, 100
 """Pickets whose variance is computed, the others interpolated, and how many at a time; chosen [C]: this variance
 changes slowly over a block, and 100 at a time, 300 columns of the inverse, fit into memory."""
+RAYS_AT_A_TIME = 50_000
+"""Rays whose partials are computed at a time: 400 bytes each."""
 
 
 def adjustment_variances(
@@ -92,6 +95,24 @@ def plan_covariances(
         return _by_unknowns(calibration, restitution, rows, local[part], photograph[part, None], plan=True)
 
     return _covariances(calibration, restitution.left, local, partials, 3)[:, :2, :2].copy()
+
+
+def plan_of_images(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photograph: np.ndarray
+) -> np.ndarray:
+    """(n, 2, 2) m²/mm², of X and Y in the CRS, by an image position with σ of 1 mm in x and y; as `plan_covariances`.
+
+    G·Gᵀ, G the inverse of the partials of the image position by X and Y: of an oblique ray more than of a vertical one.
+    """
+    frame, image = places_of(calibration), rows[photograph]
+    found = np.empty((len(xyz), 2, 2))
+    for first in range(0, len(xyz), RAYS_AT_A_TIME):
+        part = slice(first, first + RAYS_AT_A_TIME)
+        local = frame.to_local(xyz[part])
+        rays = _linearised(restitution.true, local, image[part], np.arange(len(local)), len(INTERIOR_COLUMNS))
+        gain = _gain_in_plan(rays.by_point)
+        found[part] = frame.covariances(local, gain @ np.swapaxes(gain, 1, 2))[:, :2, :2]
+    return found
 
 
 def shown_covariances(
@@ -180,6 +201,18 @@ def _by_scans(calibration: Adjustment, rays: RayPartials, own: np.ndarray) -> It
             yield np.where(first >= 0, first + axis, -1), tau[:, :, 0] * by[:, :, axis]
 
 
+def _linearised(
+    orientation: Orientation, local: np.ndarray, image: np.ndarray, point: np.ndarray, size: int
+) -> RayPartials:
+    """Of rays from points (n, 3) m in the frame, point (r,), to photographs image (r,), `size` interior elements."""
+    interior = np.zeros((len(orientation), size))
+    interior[:, :3] = orientation.interior
+    return linearise(
+        np.ascontiguousarray(np.nan_to_num(orientation.rotation)), np.ascontiguousarray(orientation.centre), local,
+        interior, image, point, image, np.zeros((len(image), 2)),
+    )  # fmt: skip
+
+
 def _gain(by_point: np.ndarray, picket: np.ndarray, count: int) -> np.ndarray:
     """(r, 3, 2) of rays, by which the points that they intersect in move."""
     normal = np.zeros((count, 3, 3))
@@ -207,13 +240,7 @@ def _by_unknowns(
     in_system[u.images] = np.arange(len(u.images))
     picket, column = np.nonzero(photographs >= 0)
     image = rows[photographs[picket, column]]
-    orientation = restitution.true
-    interior = np.zeros((len(orientation), u.lens.base.shape[1]))
-    interior[:, :3] = orientation.interior
-    rays = linearise(
-        np.ascontiguousarray(np.nan_to_num(orientation.rotation)), np.ascontiguousarray(orientation.centre), local,
-        interior, image, picket, image, np.zeros((len(image), 2)),
-    )  # fmt: skip
+    rays = _linearised(restitution.true, local, image, picket, u.lens.base.shape[1])
     gain = _gain_in_plan(rays.by_point) if plan else _gain(rays.by_point, picket, len(local))
     own = in_system[image]
     by_image = rays.by_orientation.copy()

@@ -18,6 +18,7 @@ from aerotri.conventions import InputError
 from aerotri.rasters.between_places import between_places, spread_places
 from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.image_sigma import image_sigma_of_cameras
 from aerotri.volume.bases import Surface
 from aerotri.volume.cell_noise import photographs_at
 from aerotri.volume.change.alignment import Alignment, slopes_of
@@ -208,7 +209,7 @@ def _epoch(
     filled = count > 0.0
     own = places[filled]
     per_point = PER_POINT if photographs is None else photographs_at(photographs, own)
-    pickets, seen = pickets_where_seen(calibration, own, 1e-3 * calibration.local.outcome.sigma0_um, per_point)
+    pickets, seen = pickets_where_seen(calibration, own, image_sigma_of_cameras(calibration), per_point)
     if not seen.any():
         raise InputError(
             f"no two photographs of its adjustment see {name} from different places",

@@ -16,6 +16,7 @@ from scipy.spatial import KDTree
 from aerotri.conventions import InputError
 from aerotri.rasters.between_places import between_places, spread_places
 from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.image_sigma import image_sigma_of_cameras
 from aerotri.volume.change.adjusted import in_common, variances_of_difference
 from aerotri.volume.change.clouds import Cloud, CloudDistances, quadratic
 from aerotri.volume.parts import Measured, Part
@@ -110,7 +111,7 @@ def _measured(xyz: np.ndarray, cloud: Cloud, calibration: Adjustment, name: str)
     per_point: int | np.ndarray = PER_POINT
     if cloud.photographs is not None:
         per_point = cloud.photographs[KDTree(cloud.xyz).query(xyz)[1]].astype(np.int64)
-    pickets, seen = pickets_where_seen(calibration, xyz, 1e-3 * calibration.local.outcome.sigma0_um, per_point)
+    pickets, seen = pickets_where_seen(calibration, xyz, image_sigma_of_cameras(calibration), per_point)
     if not seen.any():
         raise InputError(
             f"no two photographs of its adjustment see {name} from different places",
