@@ -221,20 +221,31 @@ def _summed(
     bounds = chunk_bounds(np.diff(pickets.start).astype(float))
     arrays = _kernels.PicketArrays(pickets.start, image, 1.0 / pickets.sigma_mm, points, along, pickets.noise_share)
     shapes = (len(u.images), 6), u.lens.base.shape, (len(nodes.xy), 2), 1, len(u.shared), 1
-    outs = [_kernels.ResponseSums(*(np.zeros(shape) for shape in shapes)) for _ in bounds]
+    # no chunk where there is no picket: the sums are 0 then
+    outs = [_kernels.ResponseSums(*(np.zeros(shape) for shape in shapes)) for _ in bounds or [None]]
 
     def chunk(k: int) -> int:
         return _kernels.respond(*bounds[k], arrays, photos, nodes.tiles, outs[k])
 
     worst = max(run_chunks(chunk, len(bounds)), default=-1)
     if worst >= 0:
-        raise InputError(
-            f"the rays of ground point (picket) {worst + 1} do not determine it", "remove its row from pickets.parquet"
-        )
+        raise _undetermined(u.block, pickets, worst)
     total = _kernels.ResponseSums(*(np.sum([out[part] for out in outs], axis=0) for part in range(6)))
     return (
         total.by_eo, total.by_interior, total.nodes, float(total.noise[0]), total.by_shared, float(total.moved[0])
     )  # fmt: skip
+
+
+def _undetermined(block: Block, pickets: Pickets, row: int) -> InputError:
+    """Names a picket by its place and its photographs: pickets were sorted, and may be cells of a raster."""
+    x, y = pickets.xyz[row, :2]
+    own = block.images.names[pickets.image[pickets.start[row] : pickets.start[row + 1]]]
+    return InputError(
+        f"the rays of the ground point (picket) at X {x:.2f}, Y {y:.2f} do not determine it; its photographs: "
+        + ", ".join(f"'{name}'" for name in own.tolist()),
+        "leave this point out (of `aerotri dtm`: its row in pickets.parquet), or measure it in photographs from "
+        "different places",
+    )
 
 
 def _scans(calibration: Adjustment) -> Scans:
@@ -253,7 +264,7 @@ def in_frame(calibration: Adjustment, xyz: np.ndarray, gradient: np.ndarray) -> 
     The partials of the CRS are those in the middle of the pickets: they change by 1e-4 in a kilometre.
     """
     frame, origin = calibration.frame, calibration.system.unknowns.origin
-    if frame is None:
+    if frame is None or not len(xyz):
         return np.ascontiguousarray(xyz - origin), np.ascontiguousarray(gradient)
     local = frame.to_local(xyz)
     partials = frame.crs_per_local(local.mean(axis=0)[None])[0]
