@@ -80,6 +80,36 @@ def covariances_at(
     return _covariances(calibration, restitution.left, local, partials, 3)
 
 
+def change_covariances(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: tuple[np.ndarray, np.ndarray],
+    photographs: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:  # fmt: skip
+    """(n, 3, 3) m² in the CRS, of second less first places (n, 3) near one another, intersected from photographs."""
+    local = [places_of(calibration).to_local(one) for one in xyz]
+
+    def partials(part: slice) -> np.ndarray:
+        first, second = (
+            _by_unknowns(calibration, restitution, rows, at[part], seen[part], plan=False)
+            for at, seen in zip(local, photographs, strict=True)
+        )
+        return second - first
+
+    return _covariances(calibration, restitution.left, local[0], partials, 3)
+
+
+def solved_partials(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photographs: np.ndarray
+) -> np.ndarray:
+    """(u, n, 3) Q·Jᵀ of the coordinates in the CRS, by the u unknowns of the reduced system; as `variances_at`."""
+    places, system = places_of(calibration), calibration.system
+    factor, local = system.factorise(calibration.solution.equations), places.to_local(xyz)
+    count = 6 * len(system.unknowns.images) + len(system.unknowns.shared)
+    j = _by_unknowns(calibration, restitution, rows, local, photographs, plan=False)[:, :, :count]
+    if places.frame is not None:
+        j = places.frame.crs_per_local(local) @ j
+    return factor.solve(np.ascontiguousarray(j.reshape(-1, count).T)).reshape(count, len(xyz), 3)
+
+
 def plan_covariances(
     calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photograph: np.ndarray
 ) -> np.ndarray:
