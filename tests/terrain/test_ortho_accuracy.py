@@ -156,3 +156,27 @@ def test_image_part_is_what_a_moved_image_position_does_on_the_ground(tilt, slop
     assert found.surface is None
     assert found.total[1, 1] == pytest.approx(np.hypot(found.image[1, 1], found.orientation[1, 1]))
     assert np.isnan(found.total).sum() == 8
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.05])
+def test_heads_of_one_station_say_nothing_of_the_surface(apart):
+    """A cell that only two heads of one station see beside one with a base: σ of both is about the same."""
+    block, _, calibration, restitution = adjusted(1)
+    centre, rotation = restitution.true.centre.copy(), restitution.true.rotation.copy()
+    centre[2] = centre[1] + (apart, 0.0, 0.0)
+    rotation[2] = rotation[1] @ looking(5.0, 20.0)
+    restitution = replace(restitution, true=replace(restitution.true, centre=centre, rotation=rotation))
+    place = centre[1] + (60.0, 40.0, 100.0 - centre[1, 2])
+    grid = Grid(1, 2, place[0] - 5.0, place[1] + 5.0, 10.0, 10.0)
+    photographs = SimpleNamespace(rows=np.arange(len(block.images)), centres=centre, restitution=restitution)
+    # photographs 1 and 0 of the first cell, 1 and 2 of the second
+    candidates = SimpleNamespace(grid=grid, z=np.full((1, 2), 100.0), found=np.array([[[1, 1]], [[0, 2]]]))
+    choice = SimpleNamespace(number=np.full((1, 2), 1))
+    found = plan_accuracy(calibration, photographs, candidates, choice, HeightSigma(same=True))
+    assert found.same
+    assert found.orientation[0, 1] == pytest.approx(found.orientation[0, 0], rel=0.1)
+    # where no cell has a base, the surface counts as one from elsewhere
+    candidates.found[1] = 2
+    alone = plan_accuracy(calibration, photographs, candidates, choice, HeightSigma(same=True))
+    assert not alone.same
+    assert np.isfinite(alone.total).all()

@@ -11,15 +11,12 @@ from aerotri.deformation.orientation import Orientation, calibrated_orientation
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.observations import Block
 from aerotri.results.adjustment import Adjustment
-from aerotri.terrain.dense.pairs import LEAST_ANGLE
+from aerotri.terrain.dense.pairs import LEAST_ANGLE, WEAKEST_ANGLE
 from aerotri.volume import _response_kernels as _kernels
 from aerotri.volume.settings import MOST_PER_POINT, PER_POINT
 
 CANDIDATES_EVERY = 64
 """Points of a row that share one list of photographs to look into."""
-WEAKEST_ANGLE = 0.5
-"""Degrees between two rays at least, where no pair has the angle that dense matching asks for [C]: a narrow lens has
-such pairs, the heads of one camera station and photographs of a hovering drone have not."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.image_sigma import image_sigma_of_cameras
 from aerotri.terrain.adjustment_part import plan_covariances, plan_of_images, shown_covariances
+from aerotri.terrain.dense.pairs import WEAKEST_ANGLE
 from aerotri.terrain.ortho.candidates import Candidates
 from aerotri.terrain.ortho.seams import Choice
 from aerotri.terrain.photographs import Photographs
@@ -167,9 +168,9 @@ def _adjustment_part(
 ) -> tuple[np.ndarray, np.ndarray | None, bool]:
     """(n,) m², mean of X and Y; (n,) m² of the heights where they come from the same adjustment; and whether they do.
 
-    Where no cell is seen by two photographs, nothing is known of how the surface moves.
+    Where no cell is seen by two photographs from different places, nothing is known of how the surface moves.
     """
-    twice = (cells.seen_by >= 0).sum(axis=1) >= 2
+    twice = _seen_with_a_base(photographs, cells) if same else np.zeros(len(cells.xyz), bool)
     same = same and bool(twice.any())
     some = _some(cells.number, twice if same else np.ones(len(twice), bool))
     xyz, number = cells.xyz[some], cells.number[some]
@@ -181,6 +182,18 @@ def _adjustment_part(
         return shown.mean(axis=1), None, False
     both = shown_covariances(*given, cells.seen_by[some])[near]
     return shown_variances(cells, both).mean(axis=1), both[:, 5, 5], True
+
+
+def _seen_with_a_base(photographs: Photographs, cells: ShownCells) -> np.ndarray:
+    """(n,) bool, whether another photograph sees a cell under an angle with the ray of the first of them."""
+    out = np.zeros(len(cells.xyz), bool)
+    least = np.cos(np.radians(WEAKEST_ANGLE))
+    for other in cells.seen_by.T[1:]:
+        two = np.flatnonzero((other >= 0) & (cells.seen_by[:, 0] >= 0) & ~out)
+        one, ray = (photographs.centres[k[two]] - cells.xyz[two] for k in (cells.seen_by[:, 0], other))
+        size = np.linalg.norm(one, axis=1) * np.linalg.norm(ray, axis=1)
+        out[two] = np.einsum("na,na->n", one, ray) <= least * size
+    return out
 
 
 def shown_variances(cells: ShownCells, both: np.ndarray) -> np.ndarray:
