@@ -37,7 +37,7 @@ COPIED = b"multiprocessing.forkserver"
 """In the command line of the process that workers are copies of, and in theirs."""
 WORKER_MARKS = (b"spawn_main", b"multiprocessing-fork", COPIED)
 """In the command line of a process that multiprocessing has started."""
-LEAST_S = 0.5
+LEAST_S = 0.1
 """A worker that has been there for less is beginning, and does nothing yet."""
 
 
@@ -84,7 +84,7 @@ def killed(words: list[str], seconds: float, chance: random.Random) -> Ended:
     """Run a command that takes so long; kill workers of it, at moments counted from when there are any."""
     line = [sys.executable, "-m", "aerotri", *words]
     program = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    count, wait_s, since = 0, chance.uniform(0.0, 0.4) * seconds, None
+    count, wait_s, since = 0, chance.uniform(0.0, 0.2) * seconds, None
     while program.poll() is None:
         there = workers_of(program.pid) if count < MOST_KILLS else []
         if there and since is None:
@@ -92,7 +92,7 @@ def killed(words: list[str], seconds: float, chance: random.Random) -> Ended:
         if there and since is not None and time.monotonic() - since > wait_s:
             with suppress(ProcessLookupError):
                 os.kill(chance.choice(there), signal.SIGKILL)
-                count, wait_s, since = count + 1, chance.uniform(0.0, 0.4) * seconds, None
+                count, wait_s, since = count + 1, chance.uniform(0.0, 0.2) * seconds, None
         time.sleep(0.05)
     assert program.stderr is not None
     return Ended(program.returncode, count, program.stderr.read()[-300:])
