@@ -1,6 +1,7 @@
 """What the adjustment adds to the variance of pickets, against the covariances of the adjusted object points."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from aerotri.deformation.restitution import restitution_of
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.simulation import parse_spec, simulate
-from aerotri.terrain.adjustment_part import adjustment_variances
+from aerotri.terrain.adjustment_part import adjustment_variances, covariances_at
+from aerotri.terrain.photographs import photographs_of
 from aerotri.terrain.pickets import Pickets
 from rolling_blocks import rolling_spec
 from small_blocks import small_block
@@ -78,3 +80,18 @@ def test_point_after_the_adjustment_is_as_sure_as_in_it(name):
         assert np.percentile(ratio, 95.0) < 1.05
     assert np.median(ratio) < 1.12
     assert (adjustment > 0.0).all()
+
+
+@pytest.mark.parametrize("parameters", ["legendre:3x3", "brown:K1+K2+b1"])
+def test_parameters_err_in_photographs_freed_of_errors_as_in_those_taken(parameters):
+    """Photographs are freed with the parameters as estimated: what is wrong with these stays, whatever their family."""
+    found = adjust_keeping_system(small_block(2, parameters)[0])
+    rows, points, rays = np.arange(len(found.result.block.images)), found.result.points, found.result.block.image_points
+    tie = np.setdiff1d(np.flatnonzero(points.rays >= 3), found.result.block.control.point)[:20]
+    seen = np.array([rays.image[rays.point == p][:3] for p in tie])
+    paths = [Path(f"{name}.tif") for name in found.result.block.images.names]
+    taken, freed = (
+        covariances_at(found, photographs_of(found, rows, paths, ideal).restitution, rows, points.xyz[tie], seen)
+        for ideal in (False, True)
+    )
+    assert freed == pytest.approx(taken, rel=1e-12)

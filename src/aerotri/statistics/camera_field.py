@@ -98,6 +98,12 @@ def known_field(found: Adjustment) -> CameraField | None:
     return _KNOWN[found]
 
 
+def noise_beside_field(found: Adjustment) -> float:
+    """σ0 of what is noise in the residuals, dimensionless: σ̂0 where there is no field, which it holds otherwise."""
+    left = known_field(found)
+    return found.local.outcome.sigma0 if left is None else left.noise
+
+
 def is_of_camera(found: Adjustment) -> bool:
     """Whether the model part of σ is of errors that all photographs of a camera share: a field takes its place."""
     part = found.local.model_part

@@ -8,9 +8,9 @@ N_k = A_kᵀW_kA_k, a change of θ moves P_k by −N_k⁻¹A_kᵀW_kB_k, so that
 
 The first part holds every correlation between pickets. Where groups of photographs share errors, it has a model part,
 see `statistics.model_of_functions`; so has what the parameters leave of the errors of a camera, see
-`statistics.camera_field`: rays of pickets have these errors too. An image error d that is not corrected moves V by
-Σ g_kᵀN_k⁻¹A_kᵀW_k·d, as does the way of the camera during the readout of a rolling shutter, and where the orientation
-was adjusted without parameters by c times its change besides.
+`statistics.camera_field`: rays of pickets have these errors too, and the noise beside them takes the place of σ̂0. An
+image error d that is not corrected moves V by Σ g_kᵀN_k⁻¹A_kᵀW_k·d, as does the way of the camera during the readout of
+a rolling shutter, and where the orientation was adjusted without parameters by c times its change besides.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from aerotri.functional_model.rotation import logarithm
 from aerotri.image_errors.tile_grid import Tile, tiles_of
 from aerotri.observations import Block, Camera
 from aerotri.results.adjustment import Adjustment
-from aerotri.statistics.camera_field import CameraField, is_of_camera, known_field
+from aerotri.statistics.camera_field import CameraField, is_of_camera, known_field, noise_beside_field
 from aerotri.statistics.covariance import inner_datum
 from aerotri.statistics.model_of_functions import model_of_functions
 from aerotri.volume import _response_kernels as _kernels
@@ -52,7 +52,8 @@ class Response:
     Parameters
     ----------
     unknowns : (6n + s,) c = ∂V/∂θ in the unknowns of the reduced system, zero where held. solved : Q·c.
-    variance : σ̂0²·cᵀQc, the part of the adjustment. model : its model part. noise : Σ gᵀN⁻¹g, the part of matching.
+    variance : σ0²·cᵀQc, the part of the adjustment, σ0 as of `noise_beside_field`. model : its model part.
+    noise : Σ gᵀN⁻¹g, the part of matching.
     by_orientation : (n, 6) ∂V by projection centre and small rotation of the photographs of the system, held or not.
     by_interior : (L, 24) ∂V by the interior elements of the system's rows.
     by_parameters : (p,) change of V by a parameter that is left uncorrected, as `error_rows`.
@@ -131,7 +132,7 @@ def respond(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, cor
     cofactor = float(c @ solved)
     if u.block.settings.adjustment.datum == "inner" and u.motions.count:
         cofactor += _inner_correction(calibration, factor, c)
-    variance = calibration.local.outcome.sigma0**2 * cofactor
+    variance = noise_beside_field(calibration) ** 2 * cofactor
     model, left = 0.0, known_field(calibration)
     if left is not None:
         model = _left_by_parameters(left, u.block, errors, nodes, deposits, c)
@@ -162,7 +163,7 @@ def _left_by_parameters(
 
 def covariance(calibration: Adjustment, first: Response, second: Response) -> float:
     """Covariance that the adjustment brings to two functionals of one block."""
-    return calibration.local.outcome.sigma0**2 * float(first.unknowns @ second.solved)
+    return noise_beside_field(calibration) ** 2 * float(first.unknowns @ second.solved)
 
 
 def control_response(calibration: Adjustment, response: Response) -> np.ndarray:

@@ -16,6 +16,7 @@ import numpy as np
 from aerotri.adjustment import rigging
 from aerotri.adjustment.scanning import READOUT
 from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.camera_field import noise_beside_field
 from aerotri.volume.parts import Measured, Part
 from aerotri.volume.pickets import Pickets
 from aerotri.volume.response import control_response, respond
@@ -141,7 +142,7 @@ def shared_control_covariance(first: Part, second: Part) -> float:
     [D] An error of a given coordinate moves both: Σ h'·h''·σ² over the coordinates shared, h = ∂V/∂(given coordinate).
     """
     total = sum(float(np.sum(h * k * variance)) for h, k, variance in _shared_control(first, second))
-    s0 = [one.calibration.local.outcome.sigma0 for one in (first, second)]
+    s0 = [noise_beside_field(one.calibration) for one in (first, second)]
     return s0[0] * s0[1] * total
 
 
@@ -152,7 +153,7 @@ def shared_camera_covariance(first: Part, second: Part) -> float:
     """
     sides = [_observed_camera(one) for one in (first, second)]
     common = sides[0].keys() & sides[1].keys()
-    s0 = [one.calibration.local.outcome.sigma0 for one in (first, second)]
+    s0 = [noise_beside_field(one.calibration) for one in (first, second)]
     return s0[0] * s0[1] * sum(sides[0][key] * sides[1][key] / key[3] for key in sorted(common))
 
 
