@@ -51,6 +51,7 @@ INSIDE = {
     "prove/volume_proof/simulated.py": "every part of σ alone, of pickets at stated places",
     "prove/volume_spline_base.py": "σ of a base alone",
     "reproduce/paper_003_deformation/even_odd.py": "deformation at single points, by another orientation",
+    "reproduce/reproduce_paper_003_dense.py": "what an adjustment brings into a difference of two of its surfaces",
     "reproduce/reproduce_paper_000.py": "the paper's formulas for two photographs, which no command uses",
 }
 """Files of tools/ that may import modules within the package, and what they measure there."""
