@@ -148,8 +148,10 @@ def main() -> None:
     print(row("pickets", out / "dtm" / "dsm.tif", options.data, out / "pickets_compared"), flush=True)
     noise, left = after_alignment(result, dense)
     print(f"\n{said}\n")
-    print(f"After the alignment the adjustment brings {noise / GSD_M:.2f} GSD by noise and {left / GSD_M:.2f} GSD by what its "
-          "parameters leave of the camera's errors.")  # fmt: skip
+    print(
+        f"After the alignment the adjustment brings {noise / GSD_M:.2f} GSD by noise and {left / GSD_M:.2f} GSD by what "
+        "its parameters leave of the camera's errors."
+    )
 
 
 if __name__ == "__main__":
