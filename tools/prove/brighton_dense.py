@@ -149,8 +149,8 @@ def main() -> None:
     noise, left = after_alignment(result, dense)
     print(f"\n{said}\n")
     print(
-        f"After the alignment the adjustment brings {noise / GSD_M:.2f} GSD by noise and {left / GSD_M:.2f} GSD by what "
-        "its parameters leave of the camera's errors."
+        f"After the alignment the adjustment brings {noise / GSD_M:.2f} GSD by noise and {left / GSD_M:.2f} GSD by "
+        "what its parameters leave of the errors of the camera."
     )
 
 
