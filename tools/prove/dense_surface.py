@@ -115,7 +115,7 @@ ERRING: dict[str, tuple[dict, str]] = {
     "self-calibrated": BY_BROWN, "errors left": IN_PART, "errors left, plain": IN_PART, "errors left, noise": IN_PART,
 }  # fmt: skip
 """What is wrong with the camera, and the parameters that are adjusted."""
-FIRST_CAMERA, CAMERAS = 101, 16
+FIRST_CAMERA, CAMERAS = 101, 12
 """Seeds of the draws of erring cameras: no constant was chosen on these. Scenes share them, a seed is one camera."""
 TIE_SIGMA_MM, DRAWS = {"y-parallax": 0.015}, 20
 """Error of tie points, and of how many draws of it the errors of a scene are taken together."""

@@ -157,7 +157,7 @@ def _left_by_parameters(
     for group, own in zip(errors, nodes.of_group, strict=True):
         used = np.flatnonzero(deposits[own].any(axis=1))
         camera = np.full(len(used), names.index(group.camera.name))
-        by_patterns += left.moved(deposits[own][used, None, :], nodes.xy[own][used], camera).sum(axis=(0, 1))
+        by_patterns += left.summed(deposits[own][used], nodes.xy[own][used], camera)
     return float(by_patterns @ by_patterns)
 
 
