@@ -26,6 +26,7 @@ INSIDE = {
     "benchmark/benchmark_volume.py": "times the response of a functional and a solution with the factor",
     "prove/defects_proof/looks.py": "looks at pivots, free directions and eigenvalues of the factor",
     "prove/brighton_dense.py": "heights of a joint covariance, by noise and by what parameters leave",
+    "prove/camera_left.py": "σ of heights with and without what the parameters leave of a camera's errors",
     "prove/change_clouds.py": "distances of clouds in memory, with adjustments that are simulated",
     "prove/dense_matchers.py": "other semi-global matching in place of the one inside",
     "prove/dense_surface.py": "σ of matching alone, cell by cell, and semi-global matching alone on the same pairs",
