@@ -4,7 +4,10 @@ The blocks are those of reproduce_paper_003_dem.py: 80 % end lap, an UltraCamD t
 tiles, and one without errors, which tells the noise. The surface of the even and that of the odd photographs of every
 strip are measured by `aerotri.dense_surface` with three adjustments: without additional parameters, with the paper's,
 and with those of the tiles and a random field. Beside the spread of even − odd stands what σ of matching foretells of
-it, and the spread of their ratio: 1 where σ is right and nothing is left of the image errors.
+it, and the spread of their ratio: 1 where σ is right and nothing is left of the image errors. Then the same with what
+the adjustment brings, and what its parameters leave of the image errors: even and odd photographs share both, so that
+the difference of what they do to either surface counts. No file has that; the tool looks inside the package for it on
+purpose. Measures: a difference over a σ of all its parts.
 
     python tools/reproduce/reproduce_paper_003_dense.py [FOLDER] [--noise 50 400] [--keep]
 """
@@ -32,9 +35,9 @@ from reproduce_paper_003_dem import CM, RESULTS, SETS, SUBSETS, prepare
 HEAD = """# Paper 003, figures 5 to 8, with dense surfaces: even against odd photographs
 
 UltraCamD erring by the physics of its tiles, 0.45 px RMS; 26 photographs at 80 %, models of 60 %. Cells of two pixels
-that both surfaces measured; cm at a GSD of 9 cm. Matching: σ of matching of both; z: difference less its mean, over it.
-With adjustment: what the adjustment and what the parameters leave bring into the difference as well; all: root mean
-square of it and of matching; z: the difference, its mean included, over that, its root mean square.
+that both surfaces measured; cm at a GSD of 9 cm. Matching: σ of matching of both; its z: the difference less its mean
+over it. Adjustment: what the adjustment and what its parameters leave bring into the difference; the last z: the
+difference, its mean included, over both together, its root mean square.
 
 | grain | adjustment | cells | mean, cm | σ, cm | robust σ, cm | matching, cm | σ of z | robust σ of z | beyond 4 σ |\
  adjustment, cm | z | beyond 4 σ |
