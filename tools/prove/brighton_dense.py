@@ -93,7 +93,11 @@ def of_matching(raster: Path, xy: np.ndarray, z: np.ndarray) -> tuple[str, str]:
     if not raster.exists():
         return "", ""
     with rasterio.open(raster) as read:
-        sigma = np.array([value[0] for value in read.sample(xy)], dtype=float)
+        at, band = ~read.transform, read.read(1, masked=True)
+    column, row_ = (np.floor(v).astype(int) for v in at * (xy[:, 0], xy[:, 1]))
+    inside = (column >= 0) & (row_ >= 0) & (column < band.shape[1]) & (row_ < band.shape[0])
+    sigma = np.full(len(xy), np.nan)
+    sigma[inside] = band.filled(np.nan)[row_[inside], column[inside]]
     known = np.isfinite(sigma) & (sigma > 0.0)
     return f"{np.median(sigma[known]) / GSD_M:.2f}", f"{nmad(z[known] / sigma[known]):.2f}"
 

@@ -8,7 +8,7 @@ its standard error by draws. Three σ are compared: without the field (the adjus
 as it is known before anything is measured (σ_f² R), and given the residuals, as the program has it. Measures z of each
 of them, so it looks inside the package on purpose. Prints Markdown.
 
-    python tools/prove/camera_left.py [--runs 25] [--blocks "one strip" …] > tools/results/camera_left.md
+    python tools/prove/camera_left.py [--runs 25] [--first 201] [--blocks …] > tools/results/camera_left.md
 """
 
 from __future__ import annotations
@@ -60,13 +60,14 @@ HEAD = (
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=25)
+    parser.add_argument("--first", type=int, default=FIRST, help="seed of the first draw")
     parser.add_argument("--blocks", nargs="+", choices=list(BLOCKS), default=list(BLOCKS))
     add_executor(parser)
     arguments = parser.parse_args()
     print("# What parameters leave of a camera's errors (tools/prove/camera_left.py)\n\n" + HEAD, flush=True)
     with runs_of(arguments) as runs:
         for name in arguments.blocks:
-            print(row(name, runs(measured, name, range(FIRST, FIRST + arguments.runs))), flush=True)
+            print(row(name, runs(measured, name, range(arguments.first, arguments.first + arguments.runs))), flush=True)
 
 
 def row(name: str, draws: list[tuple[np.ndarray, bool, list[np.ndarray]]]) -> str:
