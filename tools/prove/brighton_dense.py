@@ -108,6 +108,8 @@ def after_alignment(result: aerotri.Adjustment, found: DenseSurface) -> tuple[fl
     places, seen = [], []
     for window, tile in o.files.read_all(list(o.windows)):
         rows, columns = np.nonzero(np.isfinite(tile.z))
+        if not len(rows):
+            continue
         for n in np.unique(np.linspace(0, len(rows) - 1, max(PLACES // len(o.windows), 2)).astype(int)):
             x, y = o.grid.x(window.column + columns[n]), o.grid.y(window.row + rows[n])
             places.append([x, y, tile.z[rows[n], columns[n]]])
