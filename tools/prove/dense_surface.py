@@ -121,7 +121,7 @@ TIE_SIGMA_MM, DRAWS = {"y-parallax": 0.015}, 20
 """Error of tie points, and of how many draws of it the errors of a scene are taken together."""
 SEEDS = {"houses": 4, "few photographs": 4, "wall": 4, "trees": 4, "glass": 4, "water": 4, "self-calibrated": 4}
 """Flights and textures of a scene whose errors are taken together: where few cells tell, or a few gross errors do."""
-BESIDE_STEPS, HELD = ("houses", "few photographs", "wall", "trees"), tuple(range(7, 15))
+BESIDE_STEPS, HELD = ("houses", "few photographs", "wall", "trees"), tuple(range(5, 13))
 """Scenes with steps, and draws of them on which no constant was chosen."""
 PATCH_M, PERIOD_NODES, SHADOW, WATER, CONTRAST = (60.0, 40.0), 12, 0.12, 0.02, 0.25
 """Half sides of the patch that is painted, nodes after which a texture repeats (a metre each), share of the light
