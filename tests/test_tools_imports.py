@@ -25,6 +25,8 @@ INSIDE = {
     "benchmark/benchmark_rigs.py": "times parts of an iteration of the same flight with and without a rig",
     "benchmark/benchmark_volume.py": "times the response of a functional and a solution with the factor",
     "prove/defects_proof/looks.py": "looks at pivots, free directions and eigenvalues of the factor",
+    "prove/brighton_dense.py": "heights of a joint covariance, by noise and by what parameters leave",
+    "prove/camera_left.py": "σ of heights with and without what the parameters leave of a camera's errors",
     "prove/change_clouds.py": "distances of clouds in memory, with adjustments that are simulated",
     "prove/dense_matchers.py": "other semi-global matching in place of the one inside",
     "prove/dense_surface.py": "σ of matching alone, cell by cell, and semi-global matching alone on the same pairs",
@@ -51,6 +53,7 @@ INSIDE = {
     "prove/volume_proof/simulated.py": "every part of σ alone, of pickets at stated places",
     "prove/volume_spline_base.py": "σ of a base alone",
     "reproduce/paper_003_deformation/even_odd.py": "deformation at single points, by another orientation",
+    "reproduce/reproduce_paper_003_dense.py": "what an adjustment brings into a difference of two of its surfaces",
     "reproduce/reproduce_paper_000.py": "the paper's formulas for two photographs, which no command uses",
 }
 """Files of tools/ that may import modules within the package, and what they measure there."""

@@ -1,6 +1,7 @@
 """What the adjustment adds to the variance of pickets, against the covariances of the adjusted object points."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from aerotri.pipeline import adjust_keeping_system
 from aerotri.simulation import parse_spec, simulate
 from aerotri.statistics.camera_field import known_field
 from aerotri.terrain.adjustment_part import adjustment_variances, covariances_at
+from aerotri.terrain.photographs import photographs_of
 from aerotri.terrain.pickets import Pickets
 from aerotri.volume.pickets import pickets_of_names
 from aerotri.volume.response import respond
@@ -103,3 +105,18 @@ def test_variances_of_a_free_block_are_those_of_its_datum(parameters):
         for axis, along in enumerate(np.eye(3)):
             response = respond(found, picket, along[None])
             assert covariance[k, axis, axis] == pytest.approx(response.variance + response.model, rel=1e-3)
+
+
+@pytest.mark.parametrize("parameters", ["legendre:3x3", "brown:K1+K2+b1"])
+def test_parameters_err_in_photographs_freed_of_errors_as_in_those_taken(parameters):
+    """Photographs are freed with the parameters as estimated: what is wrong with these stays, whatever their family."""
+    found = adjust_keeping_system(small_block(2, parameters)[0])
+    rows, points, rays = np.arange(len(found.result.block.images)), found.result.points, found.result.block.image_points
+    tie = np.setdiff1d(np.flatnonzero(points.rays >= 3), found.result.block.control.point)[:20]
+    seen = np.array([rays.image[rays.point == p][:3] for p in tie])
+    paths = [Path(f"{name}.tif") for name in found.result.block.images.names]
+    taken, freed = (
+        covariances_at(found, photographs_of(found, rows, paths, ideal).restitution, rows, points.xyz[tie], seen)
+        for ideal in (False, True)
+    )
+    assert freed == pytest.approx(taken, rel=1e-12)

@@ -14,6 +14,7 @@ from aerotri.deformation.restitution import restitution_of
 from aerotri.deformation.stereo_model import covariance_of, deform_points, pair_model
 from aerotri.functional_model._kernels import INTERIOR, linearise_ray, predict_ray
 from aerotri.pipeline import adjust_keeping_system
+from aerotri.statistics.camera_field import noise_beside_field
 from aerotri.volume.functionals import tin_heights, tin_volume
 from aerotri.volume.parts import Measured, Part
 from aerotri.volume.pickets import Pickets, pickets_where_seen
@@ -140,7 +141,7 @@ def test_variance_is_that_of_the_dense_inverse(calibration, hill):
     touched = np.flatnonzero(response.unknowns)
     q = factor.columns(touched)[touched]
     c = response.unknowns[touched]
-    assert response.variance == pytest.approx(calibration.result.outcome.sigma0**2 * c @ q @ c, rel=1e-9)
+    assert response.variance == pytest.approx(noise_beside_field(calibration) ** 2 * c @ q @ c, rel=1e-9)
     dense = 0.0
     for k in np.argsort(-np.abs(gradient[:, 2]))[:5]:
         one = respond(calibration, pickets.take(np.array([k])), gradient[k : k + 1])

@@ -10,6 +10,7 @@ import pytest
 import shapely
 from scipy.stats import chi2
 
+from aerotri.statistics.camera_field import noise_beside_field
 from aerotri.volume.accuracy import volume_sigma
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import boundary_of
@@ -47,7 +48,7 @@ def test_the_joint_functional_is_the_difference_of_both(calibration, hill):
     one, other = (part_of(calibration, pickets.take(np.arange(a, b)), boundary) for a, b in ((0, 300), (100, 400)))
     joint, common = difference_part(one, other, True)
     first, second = one.response, other.response
-    s0 = calibration.local.outcome.sigma0
+    s0 = noise_beside_field(calibration)
     expected = first.variance + second.variance - 2.0 * s0**2 * first.unknowns @ second.solved
     assert joint.response.variance == pytest.approx(expected, rel=1e-6)
     assert joint.response.variance < 0.2 * min(first.variance, second.variance)

@@ -2,9 +2,11 @@
 
 The cloud (OpenDroneMap, from the photographs in full size) is sampled once a cell of about two GSD; a cell of ours
 counts as covered where it has a height. The differences are taken after a rigid alignment; a bowl that the adjustment
-leaves (no control, GNSS of metres) is in them, and is taken off in the last columns. The same is printed for what
-OpenCV's semi-global matching alone gives on the same epipolar images and for the surface of pickets. Looks inside the
-package on purpose. Prints Markdown.
+leaves (no control, GNSS of metres) is in them, and is taken off in the columns that say so. z is the difference without
+bowl over σ of matching (robust σ); the cloud has errors of its own, of which nothing is known. Below the table stands
+what the adjustment says of heights after the alignment, by noise and by what its parameters leave of the camera's
+errors. The same is printed for what OpenCV's semi-global matching alone gives on the same epipolar images and for the
+surface of pickets. Looks inside the package on purpose. Measures: heights of a joint covariance. Prints Markdown.
 
     python tools/prove/brighton_dense.py OUT --data ../shared/data/brighton > tools/results/brighton_dense.md
 """
@@ -12,6 +14,7 @@ package on purpose. Prints Markdown.
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import laspy
@@ -19,6 +22,11 @@ import numpy as np
 import rasterio
 
 import aerotri
+from aerotri.deformation.model_grid import places_of
+from aerotri.deformation.restitution import restitution_of
+from aerotri.public.dense import DenseSurface
+from aerotri.statistics.camera_field import known_field, noise_beside_field
+from aerotri.terrain.adjustment_part import _by_unknowns as by_unknowns
 from brighton_surface import GSD_M, bowl_basis, differences, modelled, nmad, robust_fit
 from dense_surface import semi_global_surface
 
@@ -26,6 +34,9 @@ FAR_M, SQUARE_M, LEAST_OPEN, MOST_OPEN = 0.2, 1.0, 0.01, 0.4
 PER_ROW = 100_000_000
 """Of the numbers of cells: more than there are in a row."""
 HEAD = "| surface | cells | covered | of the cloud's cells | NMAD m | GSD | without bowl, GSD | beyond 0.2 m |"
+HEAD += " σ of matching, GSD | z |"
+PLACES = 400
+"""Of the surface, where what the adjustment brings is computed."""
 
 
 def cells_with_points(raster: Path, cloud: Path, cell: float) -> tuple[np.ndarray, np.ndarray, int]:
@@ -73,7 +84,52 @@ def row(name: str, raster: Path, data: Path, folder: Path) -> str:
         f"{cells}", f"{100.0 * both / len(theirs):.1f} %", f"{len(theirs)}", f"{nmad(z):.4f}", f"{nmad(z) / GSD_M:.2f}",
         f"{nmad(rest) / GSD_M:.2f}", f"{100.0 * np.mean(np.abs(rest) > FAR_M):.2f} %",
     )  # fmt: skip
-    return f"| {name} | " + " | ".join(numbers) + " |"
+    said = of_matching(raster.parent / "matching.tif", xy, rest)
+    return f"| {name} | " + " | ".join([*numbers, *said]) + " |"
+
+
+def of_matching(raster: Path, xy: np.ndarray, z: np.ndarray) -> tuple[str, str]:
+    """Median σ of matching and the robust σ of differences over it; nothing where the surface has no such σ."""
+    if not raster.exists():
+        return "", ""
+    with rasterio.open(raster) as read:
+        at, band = ~read.transform, read.read(1, masked=True)
+    column, row_ = (np.floor(v).astype(int) for v in at * (xy[:, 0], xy[:, 1]))
+    inside = (column >= 0) & (row_ >= 0) & (column < band.shape[1]) & (row_ < band.shape[0])
+    sigma = np.full(len(xy), np.nan)
+    sigma[inside] = band.filled(np.nan)[row_[inside], column[inside]]
+    known = np.isfinite(sigma) & (sigma > 0.0)
+    return f"{np.median(sigma[known]) / GSD_M:.2f}", f"{nmad(z[known] / sigma[known]):.2f}"
+
+
+def after_alignment(result: aerotri.Adjustment, found: DenseSurface) -> tuple[float, float]:
+    """m, σ of heights of the surface less the plane through them: by noise, by what the parameters leave."""
+    record, o = result.record, found.record
+    places, seen = [], []
+    for window, tile in o.files.read_all(list(o.windows)):
+        rows, columns = np.nonzero(np.isfinite(tile.z))
+        if not len(rows):
+            continue
+        for n in np.unique(np.linspace(0, len(rows) - 1, max(PLACES // len(o.windows), 2)).astype(int)):
+            x, y = o.grid.x(window.column + columns[n]), o.grid.y(window.row + rows[n])
+            places.append([x, y, tile.z[rows[n], columns[n]]])
+            seen.append(o.photographs.rows[tile.measured_by(rows[n], columns[n])])
+    photographs = np.full((len(seen), max(map(len, seen))), -1)
+    for own, row_ in zip(seen, photographs, strict=True):
+        row_[: len(own)] = own
+    left, xyz = known_field(record), places_of(record).to_local(np.array(places))
+    restitution = replace(restitution_of(record), left=left)
+    everything = np.arange(len(record.local.block.images))
+    j = by_unknowns(record, restitution, everything, xyz, photographs, plan=False)[:, 2]
+    away = np.column_stack([np.ones(len(xyz)), xyz[:, :2] - xyz[:, :2].mean(axis=0)])
+    j = j - away @ np.linalg.lstsq(away, j, rcond=None)[0]
+    unknowns = 6 * len(record.system.unknowns.images) + len(record.system.unknowns.shared)
+    j, by_errors = j[:, :unknowns], j[:, unknowns:]
+    solved = record.system.factorise(record.solution.equations).solve(np.ascontiguousarray(j.T))
+    noise = noise_beside_field(record) * np.sqrt(np.mean(np.einsum("nu,un->n", j, solved)))
+    if left is None:
+        return float(noise), 0.0
+    return float(noise), float(np.sqrt(np.mean(np.sum((by_errors + j @ left.by_unknowns) ** 2, axis=1))))
 
 
 def main() -> None:
@@ -87,7 +143,8 @@ def main() -> None:
     result = aerotri.adjust(modelled(aerotri.read_block(out / "block"), "lens"), explain=False)
     print("# Brighton's dense surface against another program's cloud (tools/prove/brighton_dense.py)\n")
     print(HEAD + "\n|" + "---|" * (HEAD.count("|") - 1), flush=True)
-    aerotri.dense_surface(result, photographs).save(out / "dense", plots=False)
+    dense = aerotri.dense_surface(result, photographs)
+    dense.save(out / "dense", plots=False)
     print(row("dense", out / "dense" / "dsm.tif", options.data, out / "dense_compared"), flush=True)
     semi_global_surface(result, photographs).save(out / "semi_global", plots=False)
     print(row("semi-global alone", out / "semi_global" / "dsm.tif", options.data, out / "sgm_compared"), flush=True)
@@ -95,7 +152,12 @@ def main() -> None:
     aerotri.terrain(out / "result", photographs).save(out / "dtm", plots=False)
     said = missing(out / "dense" / "dsm.tif", options.data / "model.laz", 2.0 * GSD_M)
     print(row("pickets", out / "dtm" / "dsm.tif", options.data, out / "pickets_compared"), flush=True)
-    print(f"\n{said}")
+    noise, left = after_alignment(result, dense)
+    print(f"\n{said}\n")
+    print(
+        f"After the alignment the adjustment brings {noise / GSD_M:.2f} GSD by noise and {left / GSD_M:.2f} GSD by "
+        "what its parameters leave of the errors of the camera."
+    )
 
 
 if __name__ == "__main__":

@@ -9,6 +9,11 @@ that of
 
     r·ln Ω(γ) + Σ ln(1 + γλ),   Ω(γ) = vᵀPv − Σ z²·γλ/(1 + γλ),   σ0² = Ω/r.
 
+The residuals tell the size of the field, and much of the field itself. Given them its nodes have, with S = σ_s²·R and
+H = (σ0²·K + K·S·K)⁺, the mean p̂ = S·K·H·h and the covariance C = S − S·K·H·K·S. Nothing is corrected by p̂, so that the
+mean square about zero counts, p̂·p̂ᵀ + C: where the residuals say nothing it is S, where they say all it is that of the
+errors that are there.
+
 A place that is intersected from rays with gains G moves by G·B·p, and with the unknowns by J·F·p, F = Q·AᵀPB: where the
 parameters describe a part of the field both cancel.
 """
@@ -30,15 +35,12 @@ from aerotri.statistics.cluster_fields import (
     half_format,
     node_counts,
     nodes_at,
-    of_patterns,
 )
 from aerotri.statistics.cluster_test import LEVEL
 from aerotri.statistics.clusters import CAMERA, LARGE, Clusters
-from aerotri.statistics.model_part import why_not
 
-LENGTHS = (0.2, 0.28, 0.4)
-"""Correlation lengths looked at, in half diagonals of the format; chosen [C]: longer ones explain the residuals as
-well, and σ of heights is then up to twice the errors of simulated cameras of which parameters were estimated."""
+LENGTHS = (0.2, 0.28, 0.4, 0.57, 0.8, 1.13, 1.6)
+"""Correlation lengths looked at, in half diagonals of the format, from that of the nodes to that of the format."""
 SEEN = 1e-4
 """Eigenvalue of K over the largest below which a pattern does not count; chosen [C]: the unknowns take nearly all of it
 up, and what is left shows where the iterations ended."""
@@ -60,9 +62,10 @@ class CameraField:
     sigma : mm, of an image coordinate. length : mm.
     gain : twice the logarithm of the likelihood with the field over that without.
     noise : σ0 of what the field leaves as noise, dimensionless; σ̂0 of the adjustment holds both.
-    root : (nodes, k) of σ_s²·R. half : (c, 2) mm, half formats of all cameras. counts : nodes along x and y.
-    part : (c,) place of a camera among those with photographs, −1 for others.
-    by_unknowns : (6n + s, 2·m·k) F·R^½ of the unknowns of the reduced system; columns by part, component and pattern.
+    root : (m, 2, nodes, k) mm, root·rootᵀ the mean products of the nodes of all parts, given the residuals.
+    half : (c, 2) mm, half formats of all cameras. counts : nodes along x and y.
+    part : (c,) place of a camera among the m with photographs, −1 for others.
+    by_unknowns : (6n + s, k) F·root of the unknowns of the reduced system.
     """
 
     sigma: float
@@ -75,18 +78,24 @@ class CameraField:
     part: np.ndarray
     by_unknowns: np.ndarray
 
-    def at(self, xy: np.ndarray, camera: np.ndarray) -> np.ndarray:
-        """(r, k) mm, the patterns at image places (r, 2) mm from the middle of the format, of cameras (r,)."""
-        node, weight = nodes_at(xy, self.half[camera], self.counts)
-        return np.einsum("rc,rck->rk", weight, self.root[node])
-
     def moved(self, gain: np.ndarray, xy: np.ndarray, camera: np.ndarray) -> np.ndarray:
-        """(r, d, 2·m·k) what image errors do through the gains (r, d, 2) of rays, m a mm."""
-        k = self.root.shape[1]
-        out = np.zeros((len(gain), gain.shape[1], self.by_unknowns.shape[1] // (2 * k), 2, k))
-        ray = np.arange(len(gain))
-        out[ray, :, self.part[camera]] = gain[:, :, :, None] * self.at(xy, camera)[:, None, None, :]
-        return out.reshape(len(gain), gain.shape[1], self.by_unknowns.shape[1])
+        """(r, d, k) what image errors do through the gains (r, d, 2) of rays, m a mm.
+
+        Parameters
+        ----------
+        xy : (r, 2) mm from the middle of the format. camera : (r,).
+        """
+        node, weight = nodes_at(xy, self.half[camera], self.counts)
+        own = self.root[self.part[camera][:, None], :, node]
+        return np.einsum("rdi,rc,rcik->rdk", gain, weight, own, optimize=True)
+
+    def summed(self, gain: np.ndarray, xy: np.ndarray, camera: np.ndarray) -> np.ndarray:
+        """(k,) the sum over many rays of what `moved` gives for each, gains (r, 2)."""
+        node, weight = nodes_at(xy, self.half[camera], self.counts)
+        onto, part = np.zeros(self.root.shape[:3]), self.part[camera][:, None]
+        for axis in range(2):
+            np.add.at(onto[:, axis], (part, node), weight * gain[:, axis, None])
+        return np.einsum("min,mink->k", onto, self.root)
 
 
 def known_field(found: Adjustment) -> CameraField | None:
@@ -96,6 +105,12 @@ def known_field(found: Adjustment) -> CameraField | None:
     if found not in _KNOWN:
         _KNOWN[found] = camera_field(found)
     return _KNOWN[found]
+
+
+def noise_beside_field(found: Adjustment) -> float:
+    """σ0 of what is noise in the residuals, dimensionless: σ̂0 where there is no field, which it holds otherwise."""
+    left = known_field(found)
+    return found.local.outcome.sigma0 if left is None else left.noise
 
 
 def is_of_camera(found: Adjustment) -> bool:
@@ -113,7 +128,7 @@ def camera_field(found: Adjustment) -> CameraField | None:
     system, solution, outcome = found.system, found.solution, found.local.outcome
     u = system.unknowns
     cameras = np.unique(u.block.images.camera[u.images])
-    if why_not("", len(u.images), solution.status, outcome.sigma0) or u.block.settings.adjustment.is_free:
+    if solution.status != "converged" or not outcome.sigma0 > 0.0 or u.block.settings.adjustment.is_free:
         return None
     if len(cameras) > MOST_CAMERAS or len(u.images) * len(cameras) > LARGE:
         return None
@@ -125,25 +140,47 @@ def camera_field(found: Adjustment) -> CameraField | None:
     gain, variance, noise, length = _most_likely(found, equations, outcome.sigma0**2 * outcome.redundancy)
     if np.exp(-0.5 * gain) >= LEVEL:
         return None
-    power, patterns = np.linalg.eigh(variance * correlations(u.block.cameras, length, True))
-    kept = power > KEPT * power[-1]
-    root = patterns[:, kept] * np.sqrt(power[kept])
+    nodes = _known_nodes(equations, variance * correlations(u.block.cameras, length, True), noise)
     part = np.full(len(u.block.cameras), -1)
     part[equations.camera] = np.arange(len(equations.camera))
-    by_unknowns = factor.solve(of_patterns(equations.sides, root))
+    by_unknowns = factor.solve(np.ascontiguousarray(equations.sides @ nodes))
     by_unknowns[: 6 * len(u.images)] *= u.eo_free.reshape(-1, 1)
-    half = np.array([camera.half_format_mm for camera in u.block.cameras])
     return CameraField(
         float(np.sqrt(variance)),
         length,
         gain,
         float(np.sqrt(noise)),
-        root,
-        half,
+        nodes.reshape(len(equations.camera), 2, -1, nodes.shape[1]),
+        np.array([camera.half_format_mm for camera in u.block.cameras]),
         node_counts(u.block.cameras),
         part,
         by_unknowns,
     )
+
+
+def _known_nodes(equations: FieldEquations, prior: np.ndarray, noise: float) -> np.ndarray:
+    """(2·m·nodes, k) root of the mean products of all nodes: their mean, and the root of their covariance.
+
+    Parameters
+    ----------
+    prior : (nodes, nodes) mm², σ_s²·R. noise : σ0².
+    """
+    power, patterns = np.linalg.eigh(prior)
+    kept = power > KEPT * power[-1]
+    root = np.kron(np.eye(2 * len(equations.camera)), patterns[:, kept] * np.sqrt(power[kept]))
+    spread, scores = _seen(equations)
+    along = spread.T @ root
+    lower = np.linalg.cholesky(noise * np.eye(root.shape[1]) + along.T @ along)
+    mean = root @ np.linalg.solve(lower.T, np.linalg.solve(lower, along.T @ scores))
+    return np.column_stack([mean, np.sqrt(noise) * np.linalg.solve(lower, root.T).T])
+
+
+def _seen(equations: FieldEquations) -> tuple[np.ndarray, np.ndarray]:
+    """K^½ (2·m·nodes, q) of the patterns that residuals show, and z, the scores along them, whitened."""
+    values, vectors = np.linalg.eigh(equations.normals)
+    there = values > SEEN * values[-1]
+    root = vectors[:, there] * np.sqrt(values[there])
+    return root, (vectors[:, there].T @ equations.scores) / np.sqrt(values[there])
 
 
 def _most_likely(found: Adjustment, equations: FieldEquations, squares: float) -> tuple[float, float, float, float]:
@@ -155,10 +192,7 @@ def _most_likely(found: Adjustment, equations: FieldEquations, squares: float) -
     """
     u, redundancy = found.system.unknowns, found.local.outcome.redundancy
     cameras = u.block.cameras
-    values, vectors = np.linalg.eigh(equations.normals)
-    there = values > SEEN * values[-1]
-    root = vectors[:, there] * np.sqrt(values[there])
-    z = (vectors[:, there].T @ equations.scores) / np.sqrt(values[there])
+    root, z = _seen(equations)
     spread = root.reshape(2 * len(equations.camera), equations.nodes.count, -1)
     unit, half = float(np.median(1.0 / u.rays.inv_sigma)), float(np.hypot(*half_format(cameras)))
     sizes = (unit * SIZES) ** 2

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.camera_field import noise_beside_field
 
 
 def image_sigma_of_cameras(calibration: Adjustment) -> np.ndarray:
-    """(c,) mm, σ̂0 times the median σ of the image coordinates of a camera; of all cameras where one has none.
+    """(c,) mm, the median σ of the image coordinates of a camera after the adjustment; of all cameras where one has none.
+
+    σ̂0 times what was stated; beside a random field of the camera the noise in place of σ̂0.
 
     Cameras with pixels of different sizes have different σ in mm where they have the same in pixels.
     """
@@ -19,4 +22,4 @@ def image_sigma_of_cameras(calibration: Adjustment) -> np.ndarray:
     camera = block.images.camera[rays.image]
     own = [rays.sigma[camera == k] for k in range(count)]
     sigma = np.array([float(np.median(part if len(part) else rays.sigma)) for part in own])
-    return calibration.local.outcome.sigma0 * sigma
+    return noise_beside_field(calibration) * sigma

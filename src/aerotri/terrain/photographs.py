@@ -270,8 +270,7 @@ def photographs_of(
         For scanned film, whose pixels are no image coordinates, and for photographs without orientation.
     """
     block = calibration.local.block
-    # what is left of errors cancels against parameters at the rays, which photographs freed of errors do not have
-    restitution = replace(restitution_of(calibration, FREE), left=None if ideal else known_field(calibration))
+    restitution = replace(restitution_of(calibration, FREE), left=known_field(calibration))
     for row, path in zip(rows.tolist(), paths, strict=True):
         if row in block.interior_fits:
             raise InputError("is scanned film, which matching does not read", "resample it to its fiducials", path)
@@ -280,12 +279,13 @@ def photographs_of(
     places = places_of(calibration)
     orientation = restitution.true.take(rows)
     cameras = [block.cameras[c] for c in block.images.camera[rows]]
-    pixel = min(camera.pixel_mm for camera in cameras)
+    pixel, in_force = min(camera.pixel_mm for camera in cameras), restitution.errors
     if ideal:
         # rows of a rolling shutter have been moved to where the middle of the readout shows them
         orientation = orientation.standing_still
-        restitution = replace(restitution, errors=tuple(_without_errors(e) for e in restitution.errors))
-    tables = error_tables(restitution.errors, TABLE_TOLERANCE_PX * pixel)
+        # the restitution keeps the errors: those of their parameters are in photographs freed by them as well
+        in_force = tuple(_without_errors(e) for e in restitution.errors)
+    tables = error_tables(in_force, TABLE_TOLERANCE_PX * pixel)
     ground = mean_ground(calibration)
     centres = places.from_local(orientation.centre)
     height = centres[:, 2] - ground

@@ -8,9 +8,9 @@ N_k = A_kᵀW_kA_k, a change of θ moves P_k by −N_k⁻¹A_kᵀW_kB_k, so that
 
 The first part holds every correlation between pickets. Where groups of photographs share errors, it has a model part,
 see `statistics.model_of_functions`; so has what the parameters leave of the errors of a camera, see
-`statistics.camera_field`: rays of pickets have these errors too. An image error d that is not corrected moves V by
-Σ g_kᵀN_k⁻¹A_kᵀW_k·d, as does the way of the camera during the readout of a rolling shutter, and where the orientation
-was adjusted without parameters by c times its change besides.
+`statistics.camera_field`: rays of pickets have these errors too, and the noise beside them takes the place of σ̂0. An
+image error d that is not corrected moves V by Σ g_kᵀN_k⁻¹A_kᵀW_k·d, as does the way of the camera during the readout of
+a rolling shutter, and where the orientation was adjusted without parameters by c times its change besides.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from aerotri.functional_model.additional_parameters.registry import INTERIOR_FAM
 from aerotri.functional_model.rotation import logarithm
 from aerotri.observations import Block
 from aerotri.results.adjustment import Adjustment
-from aerotri.statistics.camera_field import CameraField, is_of_camera, known_field
+from aerotri.statistics.camera_field import CameraField, is_of_camera, known_field, noise_beside_field
 from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE
 from aerotri.statistics.covariance import inner_datum, is_inner
 from aerotri.statistics.model_of_functions import model_of_functions
@@ -50,7 +50,8 @@ class Response:
     Parameters
     ----------
     unknowns : (6n + s,) c = ∂V/∂θ in the unknowns of the reduced system, zero where held. solved : Q·c.
-    variance : σ̂0²·cᵀQc, the part of the adjustment. model : its model part. noise : Σ gᵀN⁻¹g, the part of matching.
+    variance : σ0²·cᵀQc, the part of the adjustment, σ0 as of `noise_beside_field`. model : its model part.
+    noise : Σ gᵀN⁻¹g, the part of matching.
     by_orientation : (n, 6) ∂V by projection centre and small rotation of the photographs of the system, held or not.
     by_interior : (L, 24) ∂V by the interior elements of the system's rows.
     by_parameters : (p,) change of V by a parameter that is left uncorrected, as `error_rows`.
@@ -120,7 +121,7 @@ def respond_to_all(
     cofactor = np.einsum("uk,uk->k", c, solved)
     if is_inner(system):
         cofactor += inner_datum(system, solution.state, factor, solution.estimator).correction(c)[:, 0, 0]
-    variance, model = calibration.local.outcome.sigma0**2 * cofactor, np.zeros(len(found))
+    variance, model = noise_beside_field(calibration) ** 2 * cofactor, np.zeros(len(found))
     if calibration.model is not None and not (known_field(calibration) is not None and is_of_camera(calibration)):
         own = cofactor[:, None, None]
         model = model_of_functions(system, solution, calibration.model, c, solved, 1, own)[:, 0, 0]
@@ -178,13 +179,13 @@ def _left_by_parameters(
     for group, own in zip(errors, nodes.of_group, strict=True):
         used = np.flatnonzero(deposits[own].any(axis=1))
         camera = np.full(len(used), names.index(group.camera.name))
-        by_patterns += left.moved(deposits[own][used, None, :], nodes.xy[own][used], camera).sum(axis=(0, 1))
+        by_patterns += left.summed(deposits[own][used], nodes.xy[own][used], camera)
     return float(by_patterns @ by_patterns)
 
 
 def covariance(calibration: Adjustment, first: Response, second: Response) -> float:
     """Covariance that the adjustment brings to two functionals of one block."""
-    return calibration.local.outcome.sigma0**2 * float(first.unknowns @ second.solved)
+    return noise_beside_field(calibration) ** 2 * float(first.unknowns @ second.solved)
 
 
 def control_response(calibration: Adjustment, response: Response) -> np.ndarray:

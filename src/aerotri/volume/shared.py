@@ -16,6 +16,7 @@ import numpy as np
 from aerotri.adjustment import rigging
 from aerotri.adjustment.scanning import READOUT
 from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.camera_field import noise_beside_field
 from aerotri.volume.parts import Measured, Part
 from aerotri.volume.pickets import Pickets
 from aerotri.volume.response import Response, control_response, control_responses, respond, respond_to_all
@@ -155,7 +156,7 @@ def shared_control_covariance(first: Part, second: Part) -> float:
     rows, variance = _shared_control(first.calibration, second.calibration)
     h, k = (control_response(one.calibration, one.response) for one in (first, second))
     total = float(np.sum(h[rows[0]] * k[rows[1]] * variance))
-    s0 = [one.calibration.local.outcome.sigma0 for one in (first, second)]
+    s0 = [noise_beside_field(one.calibration) for one in (first, second)]
     return s0[0] * s0[1] * total
 
 
@@ -166,7 +167,7 @@ def shared_camera_covariance(first: Part, second: Part) -> float:
     """
     sides = [_observed_camera(one.calibration, one.response.solved) for one in (first, second)]
     common = sides[0].keys() & sides[1].keys()
-    s0 = [one.calibration.local.outcome.sigma0 for one in (first, second)]
+    s0 = [noise_beside_field(one.calibration) for one in (first, second)]
     return s0[0] * s0[1] * float(sum(sides[0][key] * sides[1][key] / key[3] for key in sorted(common)))
 
 
@@ -188,7 +189,7 @@ def shared_covariances(
     first, second = (_observed_camera(one, columns) for one, columns in zip(calibrations, solved, strict=True))
     for key in sorted(first.keys() & second.keys()):
         total += first[key][:, :, None] * second[key][:, None, :] / key[3]
-    s0 = [one.local.outcome.sigma0 for one in calibrations]
+    s0 = [noise_beside_field(one) for one in calibrations]
     return s0[0] * s0[1] * total
 
 
