@@ -182,16 +182,17 @@ class SigmaOfVolumes:
         if self.below is None or not isinstance(base, SurfaceBase) or self._below[0] is None:
             return part, None
         lower = (self._below[0], base.surface, self.below.points)
-        of_lower = None if counted is None else self._counted_below(counted, base)
+        of_lower = None if counted is None else self._counted_below(counted, base, 0.0)
         return part, surface_part(lower, boundary, None, options, noise[1], of_lower)
 
-    def _counted_below(self, counted: Counted, base: SurfaceBase) -> Counted:
-        """What counts, of the surface that is the base."""
+    def _counted_below(self, counted: Counted, base: SurfaceBase, noise: float) -> Counted:
+        """What counts, of the surface that is the base; noise : m², of a height of the surface over it."""
         from aerotri.volume.bases import SurfaceBase
         from aerotri.volume.counted import Counted
 
         known = None if self.below is None or self.below.points is None else base.surface
-        return Counted(SurfaceBase(self.reader.path.name, self.reader), -counted.sign, counted.spread, known)
+        upper = SurfaceBase(self.reader.path.name, self.reader)
+        return Counted(upper, -counted.sign, counted.spread, known, noise=noise)
 
     def _net(self, base: Base, boundary: Boundary, volume: Volume) -> PileSigma:
         """Of all that is known inside a boundary."""
@@ -210,7 +211,8 @@ class SigmaOfVolumes:
         from aerotri.volume.counted import Counted
 
         sign, spread = of
-        return self._counting(net, Counted(base, sign, spread, self._known_of(net)), boundary)
+        noise = 0.0 if net.base_part is None else net.base_part.own_noise
+        return self._counting(net, Counted(base, sign, spread, self._known_of(net), noise=noise), boundary)
 
     def _spread(self, net: PileSigma, base: Base, boundary: Boundary) -> float:
         """m, σ of the height over the base along the line between cut and fill, the same error all along it."""
@@ -236,7 +238,7 @@ class SigmaOfVolumes:
             raise ValueError("what counts of a part was asked for already")
         part, other = net.part.side(counted), None
         if net.base_part is not None and net.base_part.side is not None and isinstance(base, SurfaceBase):
-            other = net.base_part.side(self._counted_below(counted, base))
+            other = net.base_part.side(self._counted_below(counted, base, net.part.own_noise))
         region = part.region
         area = 0.0 if region is None else region.area
         return PileSigma(part, other, area, volume_sigma(self.reader, base, boundary, part, other, self.options))

@@ -43,18 +43,19 @@ def same_adjustment(first: Part, second: Part) -> bool:
     return one is other or adjustment_key(one) == adjustment_key(other)
 
 
-def difference_part(surface: Part, base: Part, corrected: bool) -> tuple[Part, float]:
+def difference_part(surface: Part, base: Part, corrected: bool, of_side: bool = False) -> tuple[Part, float]:
     """The share of the difference of two surfaces of one adjustment, and which part of it was measured once, 0 … 1.
 
     Parameters
     ----------
-    base : responses to its own volume, counted positive. corrected : as of `respond`.
+    base : responses to its own volume, counted positive. corrected : as of `respond`. of_side : of a cut or a fill.
     """
     if surface.measured is None or base.measured is None:
         raise ValueError("the pickets of both surfaces are needed")
     joint, common = _joined(surface.measured, base.measured)
     response = respond(surface.calibration, joint.pickets, joint.gradient, corrected)
-    between = _difference_between(surface.between, base.between, common)
+    # where both have the same heights, nothing lies between them
+    between = both_between([(surface.between, 1.0 - common[0]), (base.between, 1.0 - common[1])], of_side)
     rays = len(joint.pickets.image)
     part = Part(surface.calibration, response, between, len(joint.pickets), rays, surface.unseen + base.unseen, joint)
     return part, float(min(common))
@@ -123,15 +124,22 @@ def _keys(pickets: Pickets) -> np.ndarray:
     return np.column_stack([place, count, *sums])
 
 
-def _difference_between(one: Between | None, other: Between | None, common: tuple[float, float]) -> Between | None:
-    """Of the surface less that of the base; where both have the same heights, nothing lies between them."""
-    sides = zip((1.0, -1.0), (one, other), common, strict=True)
-    known = [(sign, between, 1.0 - share) for sign, between, share in sides if between is not None]
-    if not known:
+def both_between(parts: Sequence[tuple[Between | None, float]], of_side: bool) -> Between | None:
+    """The ground between the heights of a surface, and of its base where that is measured too.
+
+    Parameters
+    ----------
+    parts : of the surface and of the base, and which share of each counts.
+    of_side : of a cut or a fill: either is told as what that volume holds beyond the straight lines. Else the base's is
+        what lies under the base.
+    """
+    known = [(1.0 if of_side or not k else -1.0, *part) for k, part in enumerate(parts)]
+    found = [(sign, between, share) for sign, between, share in known if between is not None]
+    if not found:
         return None
     return Between(
-        sum(sign * between.curvature * own for sign, between, own in known),
-        sum(between.variance * own for _, between, own in known),
+        sum(sign * between.curvature * share for sign, between, share in found),
+        sum(between.variance * share for _, between, share in found),
     )
 
 
