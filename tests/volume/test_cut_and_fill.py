@@ -257,19 +257,21 @@ def test_a_plane_through_the_base_loses_nothing():
 @pytest.mark.parametrize(("slope", "of_base"), [(0.0, 0.0), (0.0, 0.1), (0.02, 0.0), (0.02, 0.1)])
 def test_noise_is_taken_off_what_is_lost(slope, of_base):
     """Level ground at the base, and a slope through it, heights of both with noise: nothing is lost between points, and
-    what noise adds is told, that of a measured base too."""
+    what noise adds is told, that of a measured base too. Noise of both signs, so that its first order cancels."""
     told, added = [], []
-    for seed in range(6):
-        base_noise = HeldRaster(np.random.default_rng(50 + seed).normal(0.0, of_base, (104, 104)), FINE, None, "base")
-        base = SurfaceBase("base", base_noise)
-        xyz, triangles, area = _random_tin(lambda x, y, rng: slope * (x - 50.0) + rng.normal(0.0, 0.1, len(x)), seed)
+    x, y = np.meshgrid(*[np.arange(10.25, 90.0, 0.5)] * 2)
+    for seed, sign in ((seed, sign) for seed in range(4) for sign in (1.0, -1.0)):
+        noise = sign * np.random.default_rng(50 + seed).normal(0.0, of_base, (104, 104))
+        base = SurfaceBase("base", HeldRaster(noise, FINE, None, "base"))
+        xyz, triangles, area = _random_tin(
+            lambda x, y, rng, sign=sign: slope * (x - 50.0) + sign * rng.normal(0.0, 0.1, len(x)), seed
+        )
         counted = Counted(base, 1, noise=of_base**2 * 4.0 / 9.0)
         found = lost_on_either_side(xyz, triangles, area, counted, 0.01)
         told.append((found.ground, found.noise))
-        x, y = np.meshgrid(*[np.arange(10.25, 90.0, 0.5)] * 2)
-        surface = LinearNDInterpolator(xyz[:, :2], xyz[:, 2])(x, y)
-        h = surface - base.heights(x.ravel(), y.ravel()).reshape(x.shape)
+        h = LinearNDInterpolator(xyz[:, :2], xyz[:, 2])(x, y) - base.heights(x.ravel(), y.ravel()).reshape(x.shape)
         added.append(0.5 * (np.abs(h).mean() - np.abs(slope * (x - 50.0)).mean()) * 80.0**2)
     ground, noise = np.mean(told, axis=0)
-    assert abs(ground) < 0.1 * np.mean(added)
-    assert noise == pytest.approx(np.mean(added), rel=0.3)
+    assert abs(ground) < 0.25 * np.mean(added)
+    # on level ground at the base the scatter of 50 heights is taken for ground in part
+    assert noise == pytest.approx(np.mean(added), rel=0.35 if slope == 0.0 else 0.25)
