@@ -126,7 +126,9 @@ def test_ground_between_heights_above_a_level():
         ground = ground_of(roughness, xyz, triangles[pieces.triangle], np.ones(len(pieces.triangle)), 0.0)
         sums = prism_sums(outline.polygon, xyz[triangles][:, :, :2], xyz[triangles][:, :, 2] - height)
         for sign, k in ((1, 0), (-1, 1)):
-            found = between_on_side(ground, Counted(level(height), sign))
+            area = np.bincount(pieces.triangle, pieces.area, len(triangles))
+            lost = lost_on_either_side(xyz, triangles, area, Counted(level(height), sign), 0.0)
+            found = between_on_side(ground, Counted(level(height), sign), lost.ground)
             missed = weight @ np.maximum(sign * (z[inside] - height), 0.0) - sums[k]
             errors.append((missed, found.curvature))
             z2.append((missed - found.curvature) ** 2 / found.variance)

@@ -212,11 +212,9 @@ def _side_of_pickets(tin: _Tin, ground: Ground | None, counted: Counted) -> Part
 
 def _between_on_side(tin: _Tin, ground: Ground, counted: Counted) -> tuple[Between, float]:
     """What straight triangles leave out of a cut or a fill, and m³ that noise adds to it."""
-    net = ground.between(ground.more, ground.variance).curvature
     area = np.bincount(tin.pieces.triangle, tin.pieces.area, len(tin.triangles))
     lost = lost_on_either_side(tin.pickets.xyz, tin.triangles, area, counted, ground.noise)
-    found = between_on_side(ground, counted)
-    return replace(found, curvature=lost.ground + 0.5 * counted.sign * net), lost.noise
+    return between_on_side(ground, counted, lost.ground), lost.noise
 
 
 def part_of_measured(
