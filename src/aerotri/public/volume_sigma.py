@@ -182,17 +182,21 @@ class SigmaOfVolumes:
         if self.below is None or not isinstance(base, SurfaceBase) or self._below[0] is None:
             return part, None
         lower = (self._below[0], base.surface, self.below.points)
-        of_lower = None if counted is None else self._counted_below(counted, base, 0.0)
+        of_lower = None if counted is None else self._counted_below(counted, base)
         return part, surface_part(lower, boundary, None, options, noise[1], of_lower)
 
-    def _counted_below(self, counted: Counted, base: SurfaceBase, noise: float) -> Counted:
-        """What counts, of the surface that is the base; noise : m², of a height of the surface over it."""
+    def _counted_below(self, counted: Counted, base: SurfaceBase, net: PileSigma | None = None) -> Counted:
+        """What counts, of the surface that is the base; net : of both, where a side counts."""
         from aerotri.volume.bases import SurfaceBase
         from aerotri.volume.counted import Counted
+        from aerotri.volume.shared import places_apart
 
         known = None if self.below is None or self.below.points is None else base.surface
         upper = SurfaceBase(self.reader.path.name, self.reader)
-        return Counted(upper, -counted.sign, counted.spread, known, noise=noise)
+        found = Counted(upper, -counted.sign, counted.spread, known)
+        if net is None or net.base_part is None:
+            return found
+        return replace(found, noise=net.part.own_noise, apart=places_apart(net.part, net.base_part))
 
     def _net(self, base: Base, boundary: Boundary, volume: Volume) -> PileSigma:
         """Of all that is known inside a boundary."""
@@ -238,7 +242,7 @@ class SigmaOfVolumes:
             raise ValueError("what counts of a part was asked for already")
         part, other = net.part.side(counted), None
         if net.base_part is not None and net.base_part.side is not None and isinstance(base, SurfaceBase):
-            other = net.base_part.side(self._counted_below(counted, base, net.part.own_noise))
+            other = net.base_part.side(self._counted_below(counted, base, net))
         region = part.region
         area = 0.0 if region is None else region.area
         return PileSigma(part, other, area, volume_sigma(self.reader, base, boundary, part, other, self.options))

@@ -28,6 +28,7 @@ class Counted:
     known : where it has no height, nothing counts; None: known everywhere.
     band : m, beside the line: places within it count alone, by exp(−½·(h/band)²); 0: all.
     noise : m², variance of a height of the other that is its own alone.
+    apart : 0 … 1, how far points lie from those of the other; see `shared.places_apart`.
     """
 
     other: Base
@@ -36,6 +37,7 @@ class Counted:
     known: Surface | None = None
     band: float = 0.0
     noise: float = 0.0
+    apart: float = 1.0
 
     def on_side(self, sign: int, spread: float) -> Counted:
         """What of it lies on one side."""

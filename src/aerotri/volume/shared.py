@@ -12,6 +12,7 @@ import hashlib
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import ConvexHull, KDTree
 
 from aerotri.adjustment import rigging
 from aerotri.adjustment.scanning import READOUT
@@ -122,6 +123,24 @@ def _keys(pickets: Pickets) -> np.ndarray:
     image = pickets.image.astype(np.int64) + 1
     sums = [np.add.reduceat(values, first) for values in (image, image**2)] if len(first) else [count, count]
     return np.column_stack([place, count, *sums])
+
+
+def places_apart(surface: Part, base: Part) -> float:
+    """How far the points of a base lie from those of the surface, 0 … 1: 0 at the same places, 1 independent of them.
+
+    Straight triangles of the base lose of a cut and a fill beside what those of the surface lose. Between points at the
+    same places both have the same triangles, and what they lose together the heights of the surface over the base tell
+    already. [C] Between linearly in the mean square of the distance to the next point of the surface, whose mean is a/6
+    for places at random among squares of area a.
+    """
+    if surface.measured is None or base.measured is None:
+        return 1.0
+    xy, own = surface.measured.pickets.xyz[:, :2], base.measured.gradient[:, 2] != 0.0
+    if len(xy) < 3 or not own.any():
+        return 1.0
+    area = float(ConvexHull(xy - xy.mean(axis=0)).volume) / len(xy)
+    distance = KDTree(xy).query(base.measured.pickets.xyz[own, :2])[0]
+    return float(min(np.mean(np.minimum(np.square(distance), 0.5 * area)) / (area / 6.0), 1.0))
 
 
 def both_between(parts: Sequence[tuple[Between | None, float]], of_side: bool) -> Between | None:
