@@ -114,11 +114,11 @@ def sided(part: Part, base_part: Part, surfaces: list[TinSurface], of: tuple[int
     """The shares of both surfaces in a cut or a fill."""
     assert part.side is not None
     assert base_part.side is not None
-    sign, spread = of
+    (sign, spread), apart = of, places_apart(part, base_part)
     upper, lower = (SurfaceBase("measured", one) for one in surfaces)  # pyright: ignore[reportArgumentType]
     return (
-        part.side(Counted(lower, sign, spread, noise=base_part.own_noise)),
-        base_part.side(Counted(upper, -sign, spread, noise=part.own_noise, apart=places_apart(part, base_part))),
+        part.side(Counted(lower, sign, spread, noise=base_part.noise_at(apart))),
+        base_part.side(Counted(upper, -sign, spread, noise=part.noise_at(apart), apart=apart)),
     )
 
 

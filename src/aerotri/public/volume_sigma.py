@@ -196,7 +196,8 @@ class SigmaOfVolumes:
         found = Counted(upper, -counted.sign, counted.spread, known)
         if net is None or net.base_part is None:
             return found
-        return replace(found, noise=net.part.own_noise, apart=places_apart(net.part, net.base_part))
+        apart = places_apart(net.part, net.base_part)
+        return replace(found, noise=net.part.noise_at(apart), apart=apart)
 
     def _net(self, base: Base, boundary: Boundary, volume: Volume) -> PileSigma:
         """Of all that is known inside a boundary."""
@@ -213,9 +214,11 @@ class SigmaOfVolumes:
     def _side(self, net: PileSigma, base: Base, boundary: Boundary, of: tuple[int, float]) -> PileSigma:
         """Of the cut (1) or the fill (−1), with σ of the height along the line between them."""
         from aerotri.volume.counted import Counted
+        from aerotri.volume.shared import places_apart
 
         sign, spread = of
-        noise = 0.0 if net.base_part is None else net.base_part.own_noise
+        other = net.base_part
+        noise = 0.0 if other is None else other.noise_at(places_apart(net.part, other))
         return self._counting(net, Counted(base, sign, spread, self._known_of(net), noise=noise), boundary)
 
     def _spread(self, net: PileSigma, base: Base, boundary: Boundary) -> float:

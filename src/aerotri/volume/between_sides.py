@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from aerotri.volume.counted import PLACES, Counted, near_the_line
+from aerotri.volume.either_side import WITHIN
 from aerotri.volume.rectified import covariance_above
 from aerotri.volume.roughness import AROUND, CHUNK, Between, Ground, Roughness, terms_of_second_order
 
@@ -42,6 +43,18 @@ def sigma_at_places(ground: Ground) -> float:
     corners = ground.xyz[ground.triangles[ground.share > 0.0][:CHUNK]]
     covariance = _at_places(ground, KDTree(ground.xyz[:, :2]), corners).covariance
     return float(np.sqrt(max(np.einsum("tqq->tq", covariance).mean(), 0.0)))
+
+
+def sigma_of_straight_lines(ground: Ground) -> float:
+    """m, root of the mean square by which straight lines between heights without noise are off the ground at a place.
+
+    [D] By kriging, in the mean of the ground and beside it; what it finds because of noise is taken off.
+    """
+    corners = ground.xyz[ground.triangles[ground.share > 0.0][:CHUNK]]
+    found = _at_places(ground, KDTree(ground.xyz[:, :2]), corners)
+    bent = found.mean - np.einsum("qk,nk->nq", PLACES, corners[:, :, 2])
+    square = np.mean(np.einsum("tqq->tq", found.covariance) + np.square(bent))
+    return float(np.sqrt(max(square - WITHIN * ground.noise, 0.0)))
 
 
 @dataclass(frozen=True, eq=False)

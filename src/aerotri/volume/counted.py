@@ -27,7 +27,7 @@ class Counted:
     spread : m, σ of the height over it that all places have in common.
     known : where it has no height, nothing counts; None: known everywhere.
     band : m, beside the line: places within it count alone, by exp(−½·(h/band)²); 0: all.
-    noise : m², variance of a height of the other that is its own alone.
+    noise : m², variance of a height of the other at a place that is its own alone.
     apart : 0 … 1, how far points lie from those of the other; see `shared.places_apart`.
     """
 

@@ -12,7 +12,7 @@ from aerotri.conventions import InputError
 from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume.bases import Base, Surface
-from aerotri.volume.between_sides import between_on_side, sigma_at_places
+from aerotri.volume.between_sides import between_on_side, sigma_at_places, sigma_of_straight_lines
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.cell_noise import NO_NOISE, CellNoise, cells_sharing, photographs_at, shares_of_noise
 from aerotri.volume.counted import Counted, counted_pieces
@@ -71,6 +71,7 @@ class Part:
     lasting : errors of its heights that do not average out.
     region : what of the boundary counts; None where all does.
     own_noise : m², variance of a height at a place that is its own alone.
+    ground_sigma : gives by how much straight lines between heights are off the ground at a place, m; None: not known.
     side : gives the share of what of it counts: of a cut or a fill alone.
     """
 
@@ -85,6 +86,12 @@ class Part:
     region: Region | None = None
     side: Callable[[Counted], Part] | None = None
     own_noise: float = 0.0
+    ground_sigma: Callable[[], float] | None = None
+
+    def noise_at(self, apart: float) -> float:
+        """m², variance of the straight lines at a place; apart : as of `Counted`."""
+        ground = 0.0 if self.ground_sigma is None else self.ground_sigma()
+        return self.own_noise + apart * ground**2
 
     @property
     def lasting_variance(self) -> float:
@@ -143,6 +150,7 @@ def part_of_cells(
         region,
         side,
         own_noise,
+        lambda: within,
     )
 
 
@@ -169,7 +177,7 @@ def part_of_pickets(
     rays = len(pickets.image)
     return Part(
         calibration, response, between, len(pickets), rays, unseen, measured, region=region, side=side,
-        own_noise=WITHIN * noise,
+        own_noise=WITHIN * noise, ground_sigma=None if ground is None else partial(sigma_of_straight_lines, ground),
     )  # fmt: skip
 
 
