@@ -251,6 +251,11 @@ def test_a_plane_through_the_base_loses_nothing():
     whole = float(area @ np.abs(xyz[triangles][:, :, 1] - 50.0).mean(axis=1))
     assert abs(found.ground) < 1e-9 * whole
     assert found.noise == 0.0
+    assert found.above + found.below == pytest.approx(2.0 * found.above, rel=0.1)
+    # where nothing is below, the fill loses nothing: the cut loses all that the net volume does
+    all_above = lost_on_either_side(xyz, triangles, area, Counted(level(-10.0), 1), 0.0)
+    assert all_above.below == pytest.approx(0.0, abs=1e-9 * all_above.above)
+    assert all_above.at_least(5.0) == pytest.approx(2.5)
     one_side = lost_on_either_side(xyz, triangles, area, Counted(level(-10.0), 1), 0.0)
     assert abs(one_side.ground) < 1e-9 * whole
     assert lost_on_either_side(xyz, triangles, 0.0 * area, Counted(level(0.0), 1), 0.0) == Lost()

@@ -51,10 +51,16 @@ in windows of their size."""
 @dataclass(frozen=True)
 class Lost:
     """m³. ground : by which straight triangles make the cut and the fill too small alike. noise : by which noise makes
-    both too large."""
+    both too large. above, below : of the straight triangles, on either side of the base."""
 
     ground: float = 0.0
     noise: float = 0.0
+    above: float = 0.0
+    below: float = 0.0
+
+    def at_least(self, net: float) -> float:
+        """m³ of `ground`, so that neither cut nor fill is less than nothing; net : what the net volume loses, m³."""
+        return max(self.ground, 0.5 * net - self.below, -0.5 * net - self.above)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,21 +102,33 @@ def lost_on_either_side(
     c = MOMENT * float(moment @ net.inside) / float(net.inside.sum())
     of_corners, of_lines = _by_noise(net, noise, counted.noise)
     beside = net.inside @ (_cut(net, net.h, c) - _cut(net, _planes(net), c)) + _bent_base(net, counted)
-    return Lost(_by_kinks(net, c) + float(beside) - of_corners, of_lines)
+    size, mean = float(net.inside @ _mean_size(net.h)), float(net.inside @ net.h.mean(axis=1))
+    lost = _by_kinks(net, c) + float(beside) - of_corners
+    return Lost(lost, of_lines, 0.5 * (size + mean), 0.5 * (size - mean))
+
+
+def _alone(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of triangles with heights (t, 3) over the base: (t,) m, size of the height that has its side alone, 0 where the
+    triangle is not cut; and (t,) m², (a + b)·(a + c) of this size a and the others b and c."""
+    sign, size = np.sign(h), np.abs(h)
+    most = np.sign(np.median(h, axis=1))[:, None]
+    alone = np.argmax(np.where(most == 0.0, sign != 0.0, sign * most < 0.0), axis=1)
+    first, one, other = (np.take_along_axis(size, ((alone + k) % 3)[:, None], axis=1)[:, 0] for k in range(3))
+    cut = (h.min(axis=1) < 0.0) & (h.max(axis=1) > 0.0)
+    return np.where(cut, first, 0.0), np.maximum((first + one) * (first + other), 1e-300)
+
+
+def _mean_size(h: np.ndarray) -> np.ndarray:
+    """(t,) m, mean of |h| over straight triangles."""
+    first, product = _alone(h)
+    return np.abs(h).mean(axis=1) - 2.0 * first * (1.0 - first**2 / product) / 3.0
 
 
 def _cut(net: _Net, h: np.ndarray, c: float) -> np.ndarray:
     """(t,) m, D over the area of a triangle with heights (t, 3) over the base, zero where it is not cut."""
-    sign = np.sign(h)
-    most = np.sign(np.median(h, axis=1))[:, None]
-    alone = np.argmax(np.where(most == 0.0, sign != 0.0, sign * most < 0.0), axis=1)
-    size = np.abs(h)
-    first, one, other = (np.take_along_axis(size, ((alone + k) % 3)[:, None], axis=1)[:, 0] for k in range(3))
-    product = np.maximum((first + one) * (first + other), 1e-300)
+    first, product = _alone(h)
     slope = _slopes(net.corners[:, :, :2], h)[0]
-    mixed = (h.min(axis=1) < 0.0) & (h.max(axis=1) > 0.0)
-    lost = first * (1.0 - first**2 / product) / 3.0 - 2.0 * c * np.sum(slope**2, axis=1) * first / product
-    return np.where(mixed, lost, 0.0)
+    return 0.5 * (np.abs(h).mean(axis=1) - _mean_size(h)) - 2.0 * c * np.sum(slope**2, axis=1) * first / product
 
 
 def _planes(net: _Net) -> np.ndarray:

@@ -222,7 +222,8 @@ def _between_on_side(tin: _Tin, ground: Ground, counted: Counted) -> tuple[Betwe
     """What straight triangles leave out of a cut or a fill, and m³ that noise adds to it."""
     area = np.bincount(tin.pieces.triangle, tin.pieces.area, len(tin.triangles))
     lost = lost_on_either_side(tin.pickets.xyz, tin.triangles, area, counted, ground.noise)
-    return between_on_side(ground, counted, counted.apart * lost.ground), lost.noise
+    net = ground.between(ground.more, ground.variance).curvature
+    return between_on_side(ground, counted, counted.apart * lost.at_least(net)), lost.noise
 
 
 def part_of_measured(
