@@ -93,7 +93,7 @@ def stated_number(text: str) -> float:
     """
     value = float(text)
     if not abs(value) <= LARGEST:
-        raise ValueError(f"{text} is no number to compute with")
+        raise ValueError(f"{text} is not a number to compute with")
     return value
 
 

@@ -45,7 +45,7 @@ def refuse_beyond_memory(needed: float, what: str, remedy: str) -> None:
 def fitting(bytes_each: float) -> float:
     """How many things of a size fit into the memory that is free."""
     there = available_bytes()
-    return float("inf") if there is None else SHARE * there / bytes_each
+    return float("inf") if there is None or not bytes_each > 0.0 else SHARE * there / bytes_each
 
 
 def _sized(count: float) -> str:

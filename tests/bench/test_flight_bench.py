@@ -68,9 +68,9 @@ def test_planned_again_beside_the_plan_which_stays(folder):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"gsd": "small"}, "gsd 'small' is no number"), ({"control": "-1"}, "control '-1' is no whole number"),
+        ({"gsd": "small"}, "gsd 'small' is not a number"), ({"control": "-1"}, "control '-1' is no whole number"),
         ({"control_sigma": "1,2,3"}, "one number or two"), ({"dem": "/etc/passwd"}, "cannot be changed"),
-        ({"gsd": "nan"}, "is no number"),
+        ({"gsd": "nan"}, "is not a number"),
     ],
 )  # fmt: skip
 def test_values_that_are_not_possible(folder, given, message):
@@ -125,7 +125,7 @@ def test_page_in_a_browser(folder):
         p.fill("#field-gsd", "nonsense")
         p.click("#again")
         p.wait_for_selector("#message:not([hidden])")
-        assert "is no number" in p.inner_text("#message")
+        assert "is not a number" in p.inner_text("#message")
         p.fill("#field-gsd", "0.04")
         p.click("#again")
         p.wait_for_selector("body[data-generation='2']", timeout=120_000)

@@ -86,5 +86,5 @@ def test_a_window_that_always_fails_is_named(made, tmp_path, monkeypatch):
 
 
 def test_what_is_no_executor_is_refused(made):
-    with pytest.raises(InputError, match="'thread' is no executor"):
+    with pytest.raises(InputError, match="'thread' is not an executor"):
         made("thread", "none")

@@ -12,8 +12,10 @@ from functools import partial
 import pytest
 import toy_tasks
 
+from aerotri import memory
 from aerotri.conventions import InputError
-from aerotri.execution.choice import Choice, chosen
+from aerotri.execution import processes
+from aerotri.execution.choice import Choice, chosen, fewer_than
 from aerotri.execution.opening import opened
 from aerotri.execution.work import TasksFailedError, Work
 
@@ -101,14 +103,25 @@ def test_a_worker_has_one_thread_and_is_another_process(text, executor, work):
     import os
 
     found = executor(text).run(work(toy_tasks.environment))
-    assert {threads for threads, _ in found} == {"1"}
-    assert os.getpid() not in {process for _, process in found}
+    assert {threads for threads, _, _ in found} == {"1"}
+    assert os.getpid() not in {process for _, process, _ in found}
+
+
+@pytest.mark.parametrize("text", APART)
+def test_a_worker_has_the_environment_of_its_beginning(text, work, monkeypatch):
+    """Workers are copies of a process that may have been begun before it was changed."""
+    if text.startswith("dask"):
+        pytest.importorskip("distributed")
+    for value in ("first", "second"):
+        monkeypatch.setenv("AEROTRI_OF_TEST", value)
+        with opened(text) as executor:
+            assert {own for _, _, own in executor.run(work(toy_tasks.environment))} == {value}
 
 
 @pytest.mark.parametrize("text", APART)
 def test_more_memory_than_there_is_is_refused(text, executor, tmp_path):
     work = Work(toy_tasks.squared, 0, [1, 2], ["a", "b"], "tiles", tmp_path, 10**15)
-    with pytest.raises(InputError, match=r"2 tiles at once need .* give fewer"):
+    with pytest.raises(InputError, match=r"2 tiles at once need .* free memory, or take another machine"):
         executor(text).run(work)
 
 
@@ -140,12 +153,12 @@ def test_what_runs_where_is_understood():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("thread", "'thread' is no executor — give threads, processes:N, dask:ADDRESS or dask:local:N"),
-        ("dask", "'dask' is no executor — give threads"),
-        ("threads:2", "'threads:2' is no executor"),
-        ("processes", "'' is no number of processes — give a whole number of 1 or more, such as processes:4"),
-        ("processes:0", "'0' is no number of processes"),
-        ("processes:two", "'two' is no number of processes"),
+        ("thread", "'thread' is not an executor — give threads, processes:N, dask:ADDRESS or dask:local:N"),
+        ("dask", "'dask' is not an executor — give threads"),
+        ("threads:2", "'threads:2' is not an executor"),
+        ("processes", "'' is not a number of processes — give a whole number of 1 or more, such as processes:4"),
+        ("processes:0", "'0' is not a number of processes"),
+        ("processes:two", "'two' is not a number of processes"),
         ("dask:local:0", "such as dask:local:4"),
         ("dask:local", "such as dask:local:4"),
     ],
@@ -232,3 +245,31 @@ def test_an_interruption_before_the_work_begins_is_quiet():
             os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == 130
     assert said.decode() == ""
+
+
+def test_remedy_says_how_many_tasks_fit(monkeypatch):
+    monkeypatch.setattr(memory, "available_bytes", lambda: 10 * 2**30)
+    assert fewer_than(8, 3 * 2**30, "processes") == "give at most 2 processes"
+    assert fewer_than(2, 20 * 2**30, "workers") == "free memory, or take another machine"
+
+
+def test_a_process_killed_as_it_begins_is_begun_again(work, monkeypatch):
+    """Once; one that never begins ends the work."""
+    begun = []
+
+    class Killed(processes._Worker):
+        def __init__(self):
+            super().__init__()
+            begun.append(self)
+            if len(begun) <= kills:
+                os.kill(self._process.pid, signal.SIGKILL)
+
+    monkeypatch.setattr(processes, "_Worker", Killed)
+    kills = 1
+    with processes.Processes(1) as executor:
+        assert executor.run(work(toy_tasks.squared, shared=0, count=2)) == [0, 1]
+    assert len(begun) == 2
+    begun.clear()
+    kills = 100
+    with processes.Processes(1) as executor, pytest.raises(InputError, match="a process could not be started"):
+        executor.run(work(toy_tasks.squared, shared=0, count=2))

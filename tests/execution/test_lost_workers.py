@@ -7,14 +7,16 @@ import pytest
 
 pytest.importorskip("distributed")
 
+import toy_tasks
+
 from aerotri.conventions import InputError
 from aerotri.execution import cluster
+from aerotri.execution.work import Work
 
 
 @pytest.mark.parametrize("address", ["", "tcp://elsewhere:1"])
 def test_a_command_does_not_wait_for_its_own_workers_for_ever(address, monkeypatch):
     """Those of another scheduler may come yet: a result is waited for."""
-    monkeypatch.setattr(cluster, "LOOK_S", 0.01)
     monkeypatch.setattr(cluster, "GONE_S", 0.1)
     said, looks, done = [], [], queue.Queue()
     executor = cluster.Dask(address, 1, said.append)
@@ -28,8 +30,22 @@ def test_a_command_does_not_wait_for_its_own_workers_for_ever(address, monkeypat
 
     monkeypatch.setattr(executor, "_workers", workers)
     if address:
-        assert executor._next(done) == "late"
+        assert executor._patiently(lambda: done.get(timeout=0.01)) == "late"
     else:
         with pytest.raises(InputError, match="have ended, and none came back"):
-            executor._next(done)
+            executor._patiently(lambda: done.get(timeout=0.01))
     assert len(said) == 1
+
+
+def test_workers_that_dask_has_given_up_are_begun_anew(tmp_path, monkeypatch):
+    """Dask gives a worker up that does not come back in time, and starts no other by itself."""
+    monkeypatch.setattr(cluster, "LOOK_S", 0.5)
+    monkeypatch.setattr(cluster, "GONE_S", 20.0)
+    monkeypatch.setattr(
+        cluster, "OWN_CLUSTER", {**cluster.OWN_CLUSTER, "distributed.deploy.lost-worker-timeout": "1 ms"}
+    )
+    tasks = [0, 1, 2]
+    shared = (str(tmp_path), frozenset(tasks), 1)
+    work = Work(toy_tasks.written, shared, tasks, [str(task) for task in tasks], "tasks", tmp_path, 0)
+    with cluster.Dask("", 1, lambda text: None) as executor:
+        assert executor.run(work) == tasks

@@ -41,4 +41,4 @@ def refusing(shared, task):
 
 def environment(shared, task):
     """What a worker knows of its threads."""
-    return os.environ.get("AEROTRI_THREADS"), os.getpid()
+    return os.environ.get("AEROTRI_THREADS"), os.getpid(), os.environ.get("AEROTRI_OF_TEST")

@@ -12,6 +12,7 @@ from aerotri.formats.block.folder import read_block, write_block
 from aerotri.formats.text import table_pieces
 from aerotri.functional_model.interior import fit_fiducials
 from aerotri.observations.block import Fiducials, ImagePoints
+from aerotri.partition import ray_files
 from small_blocks import LONG_FLIGHT, small_block, with_adjustment
 
 POSITIONS = {"gnss": {"sigma_m": [0.05, 0.05, 0.08]}}
@@ -75,6 +76,14 @@ def test_files_are_those_of_the_whole(kept, tables, block, tmp_path, small_piece
     monkeypatch.setattr(block_folder, "read_image_points", refuse)
     assert divided(tmp_path / "block", tmp_path / "pieces", tables=tables) == expected
     assert sorted(path.name for path in tmp_path.iterdir()) == ["block", "pieces", "whole"]
+
+
+def test_more_parts_than_files_can_be_open(block, tmp_path, small_pieces, monkeypatch):
+    """A file that was closed holds one stream after the other."""
+    write_block(block, tmp_path / "block")
+    expected = divided(tmp_path / "block", tmp_path / "open")
+    monkeypatch.setattr(ray_files, "MOST_OPEN", 2)
+    assert divided(tmp_path / "block", tmp_path / "closed") == expected
 
 
 def test_its_adjustment_is_that_of_the_whole(block, tmp_path, small_pieces):
@@ -167,5 +176,5 @@ def test_decisions_are_refused_by_name(block, tmp_path, small_pieces):
     write_block(block, tmp_path / "block")
     row = f'"{block.points[0]}"' if "," in block.points[0] else block.points[0]
     (tmp_path / "block" / "edits.csv").write_text(f"image,point,action,reason\n,{row},off,doubtful\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"edits\.csv of a block in parts is not built"):
+    with pytest.raises(InputError, match=r"edits\.csv of a block in parts is not available"):
         aerotri.divide(tmp_path / "block", tmp_path / "parts", parts=3)

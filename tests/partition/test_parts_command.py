@@ -10,8 +10,8 @@ import pytest
     ("folder", "executor", "text"),
     [
         ("block", "processes:2", "--executor processes:2 for a block in one piece — divide it first"),
-        ("block", "processes", "is no number of processes"),
-        ("nothing", "processes:x", "is no number of processes"),
+        ("block", "processes", "is not a number of processes"),
+        ("nothing", "processes:x", "is not a number of processes"),
         ("nothing", "processes:2", "there is no such file or folder"),
     ],
 )

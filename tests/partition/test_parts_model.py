@@ -116,7 +116,8 @@ def test_numbers_are_those_of_one_piece(which, tmp_path, to_rounding):
     expected, said = (
         json.loads((tmp_path / place / "adjustment.json").read_text(encoding="utf-8")) for place in ("one", "parts")
     )
-    assert said["warnings"] == [text for text in expected["warnings"] if text in said["warnings"]]
+    # neighbouring GNSS positions are not compared in parts
+    assert said["warnings"] == [text for text in expected["warnings"] if not text.startswith("GNSS positions of")]
     assert any("total σ (tX, tY, tZ)" in text for text in said["warnings"])
 
 

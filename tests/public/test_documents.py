@@ -225,6 +225,14 @@ def test_damaged_change_of_clouds_is_refused(tmp_path):
         aerotri.export(tmp_path, tmp_path / "out", "pdf")
 
 
+def test_change_of_an_older_version_is_to_be_computed_again(clouds, tmp_path):
+    content = json.loads((clouds / "cloud_change.json").read_text())
+    del content["gained_percent"]
+    (tmp_path / "cloud_change.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match=r"written by another version .* compute the result again"):
+        aerotri.export(tmp_path, tmp_path / "out", "pdf")
+
+
 def test_command_keeps_other_exports(result, tmp_path, capsys):
     out = tmp_path / "out"
     for words in ([], ["--document", "calibration"], ["--language", "de"]):

@@ -106,5 +106,5 @@ def test_the_command_says_which_tile_failed(given, tmp_path, monkeypatch):
 
 
 def test_a_wrong_executor_is_refused(given, tmp_path):
-    with pytest.raises(aerotri.InputError, match="is no executor"):
+    with pytest.raises(aerotri.InputError, match="is not an executor"):
         aerotri.orthophoto(*given, tmp_path / "out", executor="cloud")

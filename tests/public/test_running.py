@@ -192,7 +192,7 @@ def test_the_executor_is_passed_on_and_told(fakes, photographs, tmp_path):
     for name in ("tiepoints", "dtm", "dsm", "ortho"):
         assert lines[name][-2:] == ["--executor", "processes:2"], name
     assert "--executor" not in lines["adjust"]
-    with pytest.raises(InputError, match="'thread' is no executor"):
+    with pytest.raises(InputError, match="'thread' is not an executor"):
         aerotri.run(photographs, out, executor="thread")
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aerotri.adjustment.datum import motions_of_points
+from aerotri.observations.block import Control
 from aerotri.pipeline.chain import adjust_keeping_system
 from aerotri.statistics.cluster_influence import influences, known_part
 from aerotri.statistics.cluster_test import compare_clusters, sum_of_squares, weakest_modes
@@ -308,3 +309,13 @@ def test_good_cameras_of_a_rig_have_no_errors_of_their_own():
     assert tests[CAMERA].clusters == 5
     assert not tests[CAMERA].reason
     assert not found.local.model_part.counts
+
+
+def test_test_field_of_which_all_points_are_held_has_none():
+    """Nothing of the ground can be deformed, so nothing checks strips against one another."""
+    block, truth = drone_block(1, strips=3, images_per_strip=6)
+    n = len(block.points)
+    control = Control(np.arange(n), truth.points, np.zeros((n, 3)), np.zeros(n, bool))
+    found = adjust_keeping_system(replace(block, control=control)).result
+    assert found.outcome.status == "converged"
+    assert "nothing checks the clusters against one another" in {test.reason for test in found.model_part.tests}

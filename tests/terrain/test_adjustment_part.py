@@ -9,14 +9,18 @@ from aerotri.deformation.restitution import restitution_of
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.simulation import parse_spec, simulate
-from aerotri.terrain.adjustment_part import adjustment_variances
+from aerotri.statistics.camera_field import known_field
+from aerotri.terrain.adjustment_part import adjustment_variances, covariances_at
 from aerotri.terrain.pickets import Pickets
+from aerotri.volume.pickets import pickets_of_names
+from aerotri.volume.response import respond
 from rolling_blocks import rolling_spec
-from small_blocks import small_block
+from small_blocks import small_block, with_adjustment
 
 BLOCKS = {
     "none": lambda: small_block(2, "none")[0],
     "bluh": lambda: small_block(2, "bluh:1-12,ultracam_d:42-73")[0],
+    "inner datum": lambda: with_adjustment(small_block(2, "bluh:1-12")[0], datum="inner"),
     "rolling shutter": lambda: _weak_readout(),
 }
 
@@ -78,3 +82,24 @@ def test_point_after_the_adjustment_is_as_sure_as_in_it(name):
         assert np.percentile(ratio, 95.0) < 1.05
     assert np.median(ratio) < 1.12
     assert (adjustment > 0.0).all()
+
+
+@pytest.mark.parametrize("parameters", ["none", "bluh:1-12"])
+def test_variances_of_a_free_block_are_those_of_its_datum(parameters):
+    """In the inner datum, along X, Y and Z, as a volume has them by other code."""
+    block = with_adjustment(small_block(2, parameters)[0], datum="inner")
+    found = adjust_keeping_system(block)
+    assert known_field(found) is None
+    rays, names = block.image_points, block.images.names
+    tie = np.flatnonzero(found.result.points.rays >= 3)[:6]
+    images = [rays.image[rays.point == point] for point in tie]
+    seen = np.full((len(tie), max(map(len, images))), -1)
+    for k, own in enumerate(images):
+        seen[k, : len(own)] = own
+    xyz = found.result.points.xyz[tie]
+    covariance = covariances_at(found, restitution_of(found), np.arange(len(names)), xyz, seen)
+    for k, own in enumerate(images):
+        picket = pickets_of_names(block, xyz[k : k + 1], [names[own].tolist()], 1e-3)
+        for axis, along in enumerate(np.eye(3)):
+            response = respond(found, picket, along[None])
+            assert covariance[k, axis, axis] == pytest.approx(response.variance + response.model, rel=1e-3)

@@ -1,5 +1,8 @@
 """σ of an orthophoto over a surface of the same adjustment, against simulated truth."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from rendered_blocks import CAMERA
@@ -10,7 +13,7 @@ from aerotri.pipeline import adjust_keeping_system
 from aerotri.rasters.grids import Grid
 from aerotri.simulation import parse_spec, simulate
 from aerotri.terrain.adjustment_part import covariances_at, plan_covariances, shown_covariances
-from aerotri.terrain.ortho.accuracy import ShownCells, shown_variances, slopes
+from aerotri.terrain.ortho.accuracy import HeightSigma, ShownCells, plan_accuracy, shown_variances, slopes
 from small_blocks import small_spec
 
 SLOPE = np.array([0.3, -0.2])
@@ -115,3 +118,65 @@ def test_slopes_are_those_of_a_plane_and_none_at_steps():
     np.testing.assert_array_equal(slopes(step, grid), 0.0)
     z[2, 3] = np.nan
     assert np.isfinite(slopes(z, grid)).all()
+
+
+def looking(down, north):
+    """(3, 3) of a camera that looks along a direction which leans by (down) degrees from the vertical to the north."""
+    c, s = np.cos(np.radians(down)), np.sin(np.radians(down))
+    turned = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    a, b = np.cos(np.radians(north)), np.sin(np.radians(north))
+    return np.array([[a, -b, 0.0], [b, a, 0.0], [0.0, 0.0, 1.0]]) @ turned
+
+
+@pytest.mark.parametrize("slope", [np.zeros(2), SLOPE])
+@pytest.mark.parametrize("tilt", [0.0, 20.0, 45.0])
+def test_image_part_is_what_a_moved_image_position_does_on_the_ground(tilt, slope):
+    """Rays of image positions moved by σ along x and along y meet the ground off the place; RMS of X and Y of both."""
+    block, made, calibration, restitution = adjusted(1)
+    rotation = restitution.true.rotation.copy()
+    rotation[1] = looking(tilt, 30.0)
+    restitution = replace(restitution, true=replace(restitution.true, rotation=rotation))
+    centre, interior = restitution.true.centre[1], restitution.true.interior[1]
+    sigma_mm = 1e-3 * calibration.local.outcome.sigma0_um
+    on_image = np.array([[4.0, -7.0], [4.0 + 1e-3, -7.0], [4.0, -7.0 + 1e-3]])
+    rays = np.column_stack([(on_image - interior[1:]) / interior[0], np.full(3, -1.0)]) @ rotation[1].T
+    place = centre - rays[0] / rays[0, 2] * 600.0
+    moved = np.array([met(centre, ray, place, slope)[:2] - place[:2] for ray in rays[1:]]) / 1e-3
+    expected = sigma_mm * np.sqrt(0.5 * np.sum(moved**2))
+    # three by three coarse cells of a plane around the place
+    grid = Grid(3, 3, place[0] - 15.0, place[1] + 15.0, 10.0, 10.0)
+    x, y = np.meshgrid(grid.x(np.arange(3)), grid.y(np.arange(3)))
+    z = place[2] + slope[0] * (x - place[0]) + slope[1] * (y - place[1])
+    number = np.full((3, 3), -1)
+    number[1, 1] = 1
+    photographs = SimpleNamespace(rows=np.arange(len(block.images)), centres=made.centre, restitution=restitution)
+    candidates = SimpleNamespace(grid=grid, z=z, found=np.full((1, 3, 3), 1))
+    found = plan_accuracy(calibration, photographs, candidates, SimpleNamespace(number=number), HeightSigma())
+    assert found.image[1, 1] == pytest.approx(expected, rel=1e-3)
+    assert found.surface is None
+    assert found.total[1, 1] == pytest.approx(np.hypot(found.image[1, 1], found.orientation[1, 1]))
+    assert np.isnan(found.total).sum() == 8
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.05])
+def test_heads_of_one_station_say_nothing_of_the_surface(apart):
+    """A cell that only two heads of one station see beside one with a base: σ of both is about the same."""
+    block, _, calibration, restitution = adjusted(1)
+    centre, rotation = restitution.true.centre.copy(), restitution.true.rotation.copy()
+    centre[2] = centre[1] + (apart, 0.0, 0.0)
+    rotation[2] = rotation[1] @ looking(5.0, 20.0)
+    restitution = replace(restitution, true=replace(restitution.true, centre=centre, rotation=rotation))
+    place = centre[1] + (60.0, 40.0, 100.0 - centre[1, 2])
+    grid = Grid(1, 2, place[0] - 5.0, place[1] + 5.0, 10.0, 10.0)
+    photographs = SimpleNamespace(rows=np.arange(len(block.images)), centres=centre, restitution=restitution)
+    # photographs 1 and 0 of the first cell, 1 and 2 of the second
+    candidates = SimpleNamespace(grid=grid, z=np.full((1, 2), 100.0), found=np.array([[[1, 1]], [[0, 2]]]))
+    choice = SimpleNamespace(number=np.full((1, 2), 1))
+    found = plan_accuracy(calibration, photographs, candidates, choice, HeightSigma(same=True))
+    assert found.same
+    assert found.orientation[0, 1] == pytest.approx(found.orientation[0, 0], rel=0.1)
+    # where no cell has a base, the surface counts as one from elsewhere
+    candidates.found[1] = 2
+    alone = plan_accuracy(calibration, photographs, candidates, choice, HeightSigma(same=True))
+    assert not alone.same
+    assert np.isfinite(alone.total).all()

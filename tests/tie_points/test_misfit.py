@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from aerotri.tie_points.misfit import FEWEST, without_smooth_part
+from aerotri.tie_points.misfit import FEWEST, with_sigma_of_ties, without_smooth_part
+from rig_blocks import NADIR, rig_block
 
 
 @pytest.mark.parametrize("bent_px", [0.0, 3.0])
@@ -25,3 +28,20 @@ def test_of_few_rays_nothing_is_taken_off():
     rng = np.random.default_rng(2)
     offset, xy = rng.normal(0.0, 1.0, (FEWEST - 1, 2)), rng.normal(0.0, 1.0, (FEWEST - 1, 2))
     np.testing.assert_array_equal(without_smooth_part(offset, xy, np.zeros(FEWEST - 1, int)), offset)
+
+
+@pytest.mark.parametrize("fewer", [0, 1])
+def test_sigma_in_pixels_is_that_of_cameras_with_other_pixels_too(fewer):
+    """A second head with pixels twice as large, σ of half a pixel each: whichever camera has fewer image points."""
+    oblique = NADIR | {"pixel_um": 2.0 * NADIR["pixel_um"], "size_px": [3000, 2000]}
+    block, _ = rig_block(1, cameras=("fore",), camera={"nadir": NADIR, "fore": oblique})
+    rays = block.image_points
+    kept = (block.images.camera[rays.image] != fewer) | (np.arange(len(rays)) % 3 == 0)
+    kept &= np.bincount(rays.point[kept], minlength=len(block.points))[rays.point] >= 2
+    rays = replace(rays, **{name: values[kept] for name, values in vars(rays).items()})
+    pixel = np.array([camera.pixel_mm for camera in block.cameras])[block.images.camera[rays.image]][:, None]
+    assert np.ptp(pixel) > 0.0
+    given = replace(block, image_points=replace(rays, sigma=0.5 * pixel + np.zeros((len(rays), 2))))
+    offset = np.random.default_rng(3).normal(0.0, 0.3, (len(rays), 2))
+    found, sigma_px = with_sigma_of_ties(given, offset, len(block.points))
+    np.testing.assert_allclose(found.image_points.sigma / pixel, sigma_px, rtol=1e-9)

@@ -77,5 +77,5 @@ def test_a_photograph_that_always_fails_is_named_and_the_others_are_kept(
 
 
 def test_a_wrong_executor_is_refused(made):
-    with pytest.raises(InputError, match="is no executor"):
+    with pytest.raises(InputError, match="is not an executor"):
         made("cloud", "none")

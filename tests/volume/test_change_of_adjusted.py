@@ -19,6 +19,7 @@ from aerotri.volume.accuracy import volume_sigma
 from aerotri.volume.bases import SurfaceBase
 from aerotri.volume.boundary import boundary_of
 from aerotri.volume.change.adjusted import adjusted_pair
+from aerotri.volume.change.alignment import NO_ALIGNMENT
 from aerotri.volume.change.compute import Epoch, compute_change
 from aerotri.volume.parts import part_of_cells
 from aerotri.volume.pickets import pickets_where_seen
@@ -156,9 +157,29 @@ def test_one_adjustment_cancels(blocks):
     z = ground(grid)[0]
     pair = adjusted_pair(grid, (z, z.copy()), (first, first))
     found = compute_change(grid, epoch(z), epoch(z), None, "none", [("", np.ones_like(z))], pair)
-    alone = np.sqrt(pair.first.part(pair.first.gradient(np.full_like(z, CELL**2), pair.factor)).response.variance)
+    alone = np.sqrt(pair.first.parts([pair.first.gradient(np.full_like(z, CELL**2), pair.factor)])[0].response.variance)
     assert found.volumes[0].parts["net"]["adjustment"] < 1e-6 * alone
     assert "come from one adjustment" in pair.in_words()
+
+
+@pytest.mark.parametrize("same", [True, False])
+def test_few_factors_tell_sigma_of_all_cells(blocks, monkeypatch, same):
+    """The normal equations are factorised once for all places of an epoch, and σ is what single ones give."""
+    first, second, truth = blocks[3]
+    grid = grid_in(truth)
+    z = ground(grid)[0]
+    # the second surface is higher, so that errors of one adjustment do not cancel wholly
+    given = (first, first if same else second)
+    pair = adjusted_pair(grid, (z, z + 20.0), given).aligned(NO_ALIGNMENT, np.zeros((*z.shape, 0)))
+    kind, count = type(first.system), []
+    factorise = kind.factorise
+    monkeypatch.setattr(kind, "factorise", lambda self, *given: count.append(1) or factorise(self, *given))
+    sigma = pair.sigma()
+    assert len(count) <= 3
+    for row, column in ((0, 0), (z.shape[0] - 1, z.shape[1] - 1)):
+        weight = np.zeros_like(z)
+        weight[row, column] = 1.0
+        assert sigma[row, column] == pytest.approx(np.sqrt(sum(pair.variances(weight))), rel=1e-6)
 
 
 def test_values_of_one_camera_count_once(proof):

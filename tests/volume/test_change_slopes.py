@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from aerotri.conventions import InputError
 from aerotri.rasters.grids import Grid
 from aerotri.volume.change.alignment import align, slopes_of
 
@@ -51,3 +52,14 @@ def test_edges_and_holes_do_not_enlarge_a_shift(share):
 
     true = np.array([0.1, 0.1])
     np.testing.assert_allclose(shift(true) - shift(0.0 * true), true, rtol=0.02)
+
+
+@pytest.mark.parametrize("how", ["shift", "tilt"])
+@pytest.mark.parametrize("slope", [0.0, 0.1])
+def test_a_plane_determines_no_shift(how, slope):
+    """Level ground as an airfield, or a ramp, without noise, as a DEM in whole metres has it."""
+    z = 100.0 + slope * X
+    every, sigma = np.ones((SIDE, SIDE), bool), np.full((SIDE, SIDE), SIGMA_M)
+    with pytest.raises(InputError, match="does not determine a shift"):
+        align(GRID, z, np.full(z.shape, 0.3), sigma, every, how)
+    assert align(GRID, z, np.full(z.shape, 0.3), sigma, every, "height").values == pytest.approx([0.3])

@@ -13,7 +13,13 @@ from scipy.stats import chi2
 import aerotri
 from aerotri import InputError
 from aerotri.volume.change.adjusted import variances_of_difference
-from aerotri.volume.change.adjusted_clouds import NAMES, _part, adjusted_distances, with_adjustments
+from aerotri.volume.change.adjusted_clouds import (
+    NAMES,
+    _covariances,
+    _part,
+    adjusted_distances,
+    with_adjustments,
+)
 from aerotri.volume.change.clouds import Cloud, Scales, cloud_distances, core_points
 from aerotri.volume.pickets import pickets_where_seen
 from places import PROJECT
@@ -89,6 +95,37 @@ def test_between_places_it_is_as_computed_there(proof, epochs):
     assert clouds[0].matching is not None
 
 
+@pytest.mark.parametrize("name", ["first", "common", "own"])
+def test_covariances_at_places_are_those_of_single_responses(proof, epochs, name):
+    """Of the change of two places some metres apart, along slanting directions: one response each, by other code."""
+    true = proof.site(epochs.truth)[::40]
+    calibrations = epochs.first, getattr(epochs, name)
+    given = [
+        pickets_where_seen(calibration, true + move, 1e-3 * calibration.local.outcome.sigma0_um, np.array([3]))
+        for calibration, move in zip(calibrations, (0.0, np.array([4.0, -3.0, 1.0])), strict=True)
+    ]
+    both = np.flatnonzero(given[0][1] & given[1][1])[:5]
+    pickets = [one.take((np.cumsum(seen) - 1)[both]) for one, seen in given]
+    one, two = (_part(c, p.take(np.array([0])), np.ones(3)) for c, p in zip(calibrations, pickets, strict=True))
+    found = _covariances(one, two, pickets)
+    for k in range(len(both)):
+        for along in (np.array([0.0, 0.0, 1.0]), np.array([0.6, 0.0, 0.8]), np.array([1.0, -2.0, 0.5])):
+            parts = [_part(c, p.take(np.array([k])), along) for c, p in zip(calibrations, pickets, strict=True)]
+            alone = [part.response.variance + part.response.model for part in parts]
+            expected = sum(variances_of_difference(*parts)), *alone
+            # image errors are bilinear between nodes in a response, which a small difference of two places shows more
+            assert [along @ part[k] @ along for part in found] == pytest.approx(expected, rel=5e-3)
+
+
+def test_few_factors_tell_all_places(proof, epochs, monkeypatch):
+    """The normal equations of an epoch are factorised a few times, not once for every place and direction."""
+    kind, count = type(epochs.first.system), []
+    factorise = kind.factorise
+    monkeypatch.setattr(kind, "factorise", lambda self, *given: count.append(1) or factorise(self, *given))
+    measured(proof, epochs, epochs.common)
+    assert len(count) <= 10
+
+
 def test_one_adjustment_cancels(proof, epochs):
     clouds, found, adjusted = measured(proof, epochs, epochs.first)
     known = np.isfinite(found.distance)
@@ -145,5 +182,5 @@ def test_the_user_gives_two_results(proof):
     assert any("one adjustment" in text for text in found.warnings)
     with pytest.raises(InputError, match="given alone"):
         aerotri.cloud_change(xyz, xyz, cylinder=30.0, first_adjustment=result)
-    with pytest.raises(InputError, match="no photograph of its adjustment sees the first cloud"):
+    with pytest.raises(InputError, match="no two photographs of its adjustment see the first cloud"):
         aerotri.cloud_change(xyz + 1e5, xyz + 1e5, cylinder=30.0, first_adjustment=result, second_adjustment=result)

@@ -8,14 +8,17 @@ import numpy as np
 import pytest
 
 from aerotri.adjustment.unknowns import Step
+from aerotri.conventions import InputError
 from aerotri.deformation.error_parameters import shared_columns
 from aerotri.deformation.restitution import restitution_of
 from aerotri.deformation.stereo_model import covariance_of, deform_points, pair_model
 from aerotri.functional_model._kernels import INTERIOR, linearise_ray, predict_ray
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.volume.functionals import tin_heights, tin_volume
+from aerotri.volume.parts import Measured, Part
 from aerotri.volume.pickets import Pickets, pickets_where_seen
 from aerotri.volume.response import control_response, covariance, respond, systematic
+from aerotri.volume.shared import difference_part, summed_part
 from small_blocks import small_block, with_adjustment
 
 
@@ -263,3 +266,33 @@ def test_response_to_control_is_numeric(calibration, hill):
             heights.append(np.mean(intersect(calibration, few, state, xy, basis)[:, 2]))
         row = int(np.flatnonzero(u.points == block.control.point[k])[0])
         assert (heights[0] - heights[1]) / 0.04 == pytest.approx(found[row, 2], rel=0.02)
+
+
+def test_a_point_whose_rays_do_not_meet_is_named_by_its_place(calibration, hill):
+    """After sorting, or of a raster, its number says nothing."""
+    pickets = hill[0]
+    one = pickets.take(np.arange(3))
+    image = np.concatenate(
+        [one.image[: one.start[1]], np.repeat(one.image[one.start[1]], 2), one.image[one.start[2] :]]
+    )
+    count = [one.start[1], 2, len(one.image) - one.start[2]]
+    wrong = replace(one, start=np.append(0, np.cumsum(count)), image=image, sigma_mm=np.full(len(image), 0.003))
+    (x, y), name = one.xyz[1, :2], calibration.local.block.images.names[one.image[one.start[1]]]
+    with pytest.raises(InputError) as error:
+        respond(calibration, wrong, np.ones((3, 3)))
+    assert f"X {x:.2f}, Y {y:.2f}" in str(error.value)
+    assert f"'{name}', '{name}'" in str(error.value)
+
+
+def test_a_volume_without_points_responds_to_nothing(calibration, hill):
+    """As of piles whose fills have no height each: no measurement has a weight in their sum."""
+    pickets = hill[0]
+    nothing = respond(calibration, pickets.take(np.arange(0)), np.zeros((0, 3)))
+    assert (nothing.variance, nothing.model, nothing.noise, nothing.error) == (0.0, 0.0, 0.0, 0.0)
+    assert not nothing.unknowns.any()
+    assert nothing.by_orientation.shape == (len(calibration.system.unknowns.images), 6)
+    measured = Measured(pickets, np.zeros((len(pickets), 3)))
+    part = Part(calibration, nothing, None, len(pickets), len(pickets.image), 0.0, measured)
+    for found in (summed_part([part, part], True), difference_part(summed_part([part], True), part, True)[0]):
+        assert found.response.variance == 0.0
+        assert found.lasting_variance == 0.0

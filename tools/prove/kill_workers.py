@@ -33,9 +33,11 @@ from benchmark_executors import commands, content, prepare, run, target
 KILLING = ("processes:2", "dask:local:2")
 MOST_KILLS = 2
 """Of one run: a task that was begun three times is given up."""
-WORKER_MARKS = (b"spawn_main", b"multiprocessing-fork")
+COPIED = b"multiprocessing.forkserver"
+"""In the command line of the process that workers are copies of, and in theirs."""
+WORKER_MARKS = (b"spawn_main", b"multiprocessing-fork", COPIED)
 """In the command line of a process that multiprocessing has started."""
-LEAST_S = 1.0
+LEAST_S = 0.5
 """A worker that has been there for less is beginning, and does nothing yet."""
 
 
@@ -59,10 +61,17 @@ def workers_of(program: int) -> list[int]:
         own |= more
     for process in own - {program}:
         with suppress(OSError):
-            line = Path(f"/proc/{process}/cmdline").read_bytes()
-            if any(mark in line for mark in WORKER_MARKS) and age_of(process) > LEAST_S:
+            line = line_of(process)
+            is_worker = any(mark in line for mark in WORKER_MARKS)
+            is_original = COPIED in line and COPIED not in line_of(parents[process])
+            if is_worker and not is_original and age_of(process) > LEAST_S:
                 found.append(process)
     return found
+
+
+def line_of(process: int) -> bytes:
+    """Command line of a process."""
+    return Path(f"/proc/{process}/cmdline").read_bytes()
 
 
 def age_of(process: int) -> float:
@@ -72,18 +81,18 @@ def age_of(process: int) -> float:
 
 
 def killed(words: list[str], seconds: float, chance: random.Random) -> Ended:
-    """Run a command that takes so long, and kill workers of it."""
+    """Run a command that takes so long; kill workers of it, at moments counted from when there are any."""
     line = [sys.executable, "-m", "aerotri", *words]
     program = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    count, begun = 0, time.monotonic()
-    moments = sorted(begun + chance.uniform(0.3, 1.1) * seconds for _ in range(MOST_KILLS))
+    count, wait_s, since = 0, chance.uniform(0.0, 0.4) * seconds, None
     while program.poll() is None:
-        if count < len(moments) and time.monotonic() > moments[count]:
-            there = workers_of(program.pid)
-            if there:
-                with suppress(ProcessLookupError):
-                    os.kill(chance.choice(there), signal.SIGKILL)
-                    count += 1
+        there = workers_of(program.pid) if count < MOST_KILLS else []
+        if there and since is None:
+            since = time.monotonic()
+        if there and since is not None and time.monotonic() - since > wait_s:
+            with suppress(ProcessLookupError):
+                os.kill(chance.choice(there), signal.SIGKILL)
+                count, wait_s, since = count + 1, chance.uniform(0.0, 0.4) * seconds, None
         time.sleep(0.05)
     assert program.stderr is not None
     return Ended(program.returncode, count, program.stderr.read()[-300:])

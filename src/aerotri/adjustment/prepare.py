@@ -106,7 +106,7 @@ def _freed_of_the_air(block: Block, start: StartValues) -> Block:
 
 
 def check_settings(block: Block) -> None:
-    """Refuse what is not built, rather than pass over it.
+    """Refuse what is not available, rather than pass over it.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def check_settings(block: Block) -> None:
     ]
     for wrong, what, remedy in refused:
         if wrong:
-            raise InputError(f"{what} is not built into this version", remedy, file="block.toml")
+            raise InputError(f"{what} is not available", remedy, file="block.toml")
     if s.adjustment.datum == "fixed" and not s.adjustment.datum_fixed:
         raise InputError(
             'datum = "fixed", but datum_fixed names no element',

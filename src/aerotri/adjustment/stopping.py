@@ -36,7 +36,7 @@ ROUNDING = 1e-13
 def is_settled(at: Place, step: Trial, redundancy: int, robust_tolerance: float | None, last_decrement: float) -> bool:
     """Whether the step just taken from `at` was the last that matters.
 
-    The decrement of the next step is foretold from how the last pair of undamped steps contracted. Re-weighting
+    The decrement of the next step is predicted from how the last pair of undamped steps contracted. Re-weighting
     converges linearly, and a point whose two rays contradict each other creeps along a flat valley for ever: robust,
     the orientations and shared parameters have to stand, and the cost. Points go on alone then (`settled_points`).
 

@@ -52,7 +52,7 @@ def _number(name: str, text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f"{_words(name)} '{text[:30]}' is no number", "write it with a point, such as 0.02")
+        raise InputError(f"{_words(name)} '{text[:30]}' is not a number", "write it with a point, such as 0.02")
     return value
 
 

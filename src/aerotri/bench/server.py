@@ -129,7 +129,7 @@ class Given:
         """A row of a table."""
         value = self._content.get(name)
         if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < MOST:
-            raise InputError(f"{name} is no number of a row", RELOAD)
+            raise InputError(f"{name} is not the number of a row", RELOAD)
         return value
 
     def text(self, name: str) -> str:
@@ -269,5 +269,5 @@ def _whole(asked: Request, name: str) -> int | None:
     if not text:
         return None
     if not text.removeprefix("-").isdecimal() or len(text) > 9:
-        raise InputError(f"{name} = '{text[:30]}' is no number of a row", RELOAD)
+        raise InputError(f"{name} = '{text[:30]}' is not the number of a row", RELOAD)
     return int(text)

@@ -21,7 +21,8 @@ class Interrupted(KeyboardInterrupt):
 
 def is_program() -> bool:
     """Whether this process is the command line program, and not one that imports it."""
-    if "--multiprocessing-fork" in sys.orig_argv:
+    processes = sys.modules.get("multiprocessing.process")
+    if "--multiprocessing-fork" in sys.orig_argv or (processes is not None and processes.parent_process() is not None):
         return False  # a process that the program started
     if not sys.argv:
         return False

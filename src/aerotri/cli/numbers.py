@@ -47,6 +47,6 @@ def refusal(name: str, value: Any) -> str:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return ""
     if isinstance(value, float) and not math.isfinite(value):
-        return f"{value} is no number to compute with."
+        return f"{value} is not a number to compute with."
     largest = LARGEST if isinstance(value, float) else LARGEST_SEED if name == "seed" else LARGEST_COUNT
     return f"{value:g} is too large, at most {largest:g} can be." if abs(value) > largest else ""

@@ -134,7 +134,7 @@ def _has_image_errors(unknowns: Unknowns) -> bool:
 
 
 def _without_parameters(system: NormalSystem, solution: Solution, state: State) -> tuple[NormalSystem, State]:
-    """The same block without additional parameters and rolling shutters, its observations as `state` foretells them."""
+    """The same block without additional parameters and rolling shutters, its observations as `state` predicts them."""
     u = system.unknowns
     predicted = u.rays.xy - system.assemble(state, 0.0, solution.estimator).residual
     weight = np.sqrt(solution.equations.weight)[:, None]

@@ -7,6 +7,7 @@ from importlib.util import find_spec
 from typing import Literal
 
 from aerotri.conventions import InputError
+from aerotri.memory import fitting
 
 THREADS = "threads"
 """Where nothing is stated."""
@@ -52,13 +53,19 @@ def chosen(text: str) -> Choice:
         local, _, number = rest.partition(":")
         is_local = local == "local"
         return Choice("dask", _count(text, number, "dask:local:4")) if is_local else Choice("dask", 0, rest)
-    raise InputError(f"'{text}' is no executor", f"give {FORMS}")
+    raise InputError(f"'{text}' is not an executor", f"give {FORMS}")
+
+
+def fewer_than(count: int, bytes_each: float, what: str) -> str:
+    """The remedy where so many tasks do not fit into memory together: how many do."""
+    most = int(min(fitting(bytes_each), count - 1))
+    return f"give at most {most} {what}" if most > 0 else "free memory, or take another machine"
 
 
 def _count(text: str, number: str, example: str) -> int:
     if not (number.isascii() and number.isdigit() and int(number) >= 1):
         raise InputError(
-            f"executor '{text}': '{number}' is no number of processes",
+            f"executor '{text}': '{number}' is not a number of processes",
             f"give a whole number of 1 or more, such as {example}",
         )
     return int(number)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import logging
+import os
 import queue
 import signal
 import time
 import uuid
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from types import TracebackType
@@ -16,8 +19,11 @@ from typing import Any, Self
 
 import dask
 from distributed import Client, LocalCluster, WorkerPlugin
+from distributed.scheduler import KilledWorker
 
 from aerotri.conventions import InputError
+from aerotri.execution.beginning import method, prepare_copies
+from aerotri.execution.choice import fewer_than
 from aerotri.execution.elsewhere import ONE_THREAD, outcome_in, parcels, perform
 from aerotri.execution.work import MOST_TRIES, Ledger, Outcome, R, Report, S, Say, T, Work
 from aerotri.memory import SHARE, available_bytes, refuse_beyond_memory
@@ -29,6 +35,9 @@ OWN_CLUSTER: dict[str, Any] = {
     # memory given back to the system at once costs a third of the time of a tile
     "distributed.nanny.pre-spawn-environ": {},
     "distributed.admin.tick.interval": "500 ms",
+    "distributed.worker.multiprocessing-method": method(),
+    # on a busy machine a worker takes longer than Dask's 15 s to begin again after it was killed
+    "distributed.deploy.lost-worker-timeout": "60 s",
 }
 """Settings of Dask for workers that are started here."""
 UNWATCHED = {
@@ -79,7 +88,7 @@ class Dask:
         if not self._address:
             count = min(self._count, len(work.tasks))
             refuse_beyond_memory(
-                count * work.bytes_each, f"{count} {work.what} at once", "give fewer workers, {share} times as many"
+                count * work.bytes_each, f"{count} {work.what} at once", fewer_than(count, work.bytes_each, "workers")
             )
             if self._client is None and self._starting is not None:
                 _, self._client = self._starting.result()
@@ -110,10 +119,11 @@ class Dask:
             for future in futures:
                 future.add_done_callback(done.put)
             for _ in range(len(futures)):
-                future = self._next(done)
+                future = self._patiently(partial(done.get, timeout=LOOK_S))
                 number = futures[future]
-                if future.status == "finished":
-                    ledger.take(number, outcome_in(future.result()))
+                content = self._content(future)
+                if content is not None:
+                    ledger.take(number, outcome_in(content))
                 elif is_last:
                     ledger.take(number, Outcome(failed=_reason(future)))
                 else:
@@ -123,8 +133,17 @@ class Dask:
             self._client.cancel([future for future in futures if not future.done()])
         return sorted(lost)
 
-    def _next(self, done: queue.Queue[Any]) -> Any:
-        """The next task that ended; says so where nobody works.
+    def _content(self, future: Any) -> bytes | None:
+        """What a task gave; None where its worker was lost, with the result that it still had too."""
+        if future.status != "finished":
+            return None
+        try:
+            return self._patiently(partial(future.result, timeout=LOOK_S))
+        except (KilledWorker, CancelledError):
+            return None
+
+    def _patiently(self, asked: Callable[[], Any]) -> Any:
+        """What is asked for, asked again as long as it is not there; says so where nobody works.
 
         Raises
         ------
@@ -134,27 +153,31 @@ class Dask:
         alone_since = time.monotonic()
         while True:
             try:
-                return done.get(timeout=LOOK_S)
-            except queue.Empty:
+                return asked()
+            except (queue.Empty, TimeoutError):
+                self._replace_lost()
                 if self._workers():
                     alone_since = time.monotonic()
                     continue
                 if not self._address and time.monotonic() - alone_since > GONE_S:
-                    raise InputError(
-                        "all Dask workers that were started here have ended, and none came back",
-                        "run the command again; with --executor processes:N if it happens again",
-                    ) from None
+                    raise _none_came_back() from None
                 if not self._told_waiting:
                     self._say(f"Dask scheduler {self._client.scheduler.address}: no worker at the moment, waiting")
                     self._told_waiting = True
 
+    def _replace_lost(self) -> None:
+        """Begin others for those started here that Dask has given up, such as one that was killed as it began."""
+        if self._starting is not None and len(self._workers()) < self._count:
+            self._starting.result()[0].scale(self._count)
+
     def _started(self) -> tuple[LocalCluster, Client]:
         """Workers that begin, and who speaks with them."""
+        prepare_copies({**ONE_THREAD, **UNWATCHED}, ("distributed",))
         there = available_bytes()
         memory: dict[str, Any] = {} if there is None else {"resources": {MEMORY: SHARE * there / self._count}}
         cluster = LocalCluster(
             n_workers=self._count, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
-            silence_logs=logging.CRITICAL, env={**ONE_THREAD, **UNWATCHED}, **memory,
+            silence_logs=logging.CRITICAL, env={**os.environ, **ONE_THREAD, **UNWATCHED}, **memory,
         )  # fmt: skip
         client = Client(cluster)
         client.register_plugin(_NotInterrupted())
@@ -182,11 +205,14 @@ class Dask:
         Raises
         ------
         InputError
-            When no worker has so much.
+            When no worker has so much, or none of those that were started here is there.
         """
         if not self._workers():
             self._say(f"Dask scheduler {self._client.scheduler.address}: no worker yet, waiting")
-            self._client.wait_for_workers(1)
+            try:
+                self._client.wait_for_workers(1, timeout=None if self._address else GONE_S)
+            except TimeoutError:
+                raise _none_came_back() from None
         workers = list(self._workers().values())
         offered = [worker["resources"][MEMORY] for worker in workers if MEMORY in worker.get("resources", {})]
         free = offered or [_memory_of_thread(worker) for worker in workers]
@@ -208,6 +234,13 @@ class _NotInterrupted(WorkerPlugin):
         """Called in the main thread of a worker when it begins."""
         with suppress(ValueError):
             signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _none_came_back() -> InputError:
+    return InputError(
+        "all Dask workers that were started here have ended, and none came back",
+        "run the command again; with --executor processes:N if it happens again",
+    )
 
 
 def _memory_of_thread(worker: dict[str, Any]) -> float:

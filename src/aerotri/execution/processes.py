@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 import signal
 from collections import deque
-from collections.abc import Generator
-from contextlib import contextmanager, suppress
-from multiprocessing import get_context
+from contextlib import suppress
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from types import TracebackType
 from typing import Any, Self
 
 from aerotri.conventions import InputError
+from aerotri.execution.beginning import context, environment_of, prepare_copies
+from aerotri.execution.choice import fewer_than
 from aerotri.execution.elsewhere import ONE_THREAD, outcome_in, parcels, perform
 from aerotri.execution.work import MOST_TRIES, Ledger, Outcome, R, Report, S, T, Work
 from aerotri.memory import refuse_beyond_memory
@@ -36,6 +36,8 @@ class Processes:
         self._workers: list[_Worker] = []
 
     def __enter__(self) -> Self:
+        # importing takes seconds: meanwhile the command reads its files
+        prepare_copies(ONE_THREAD)
         return self
 
     def __exit__(
@@ -49,7 +51,7 @@ class Processes:
         """See `work.Executor`."""
         count = min(self._count, len(work.tasks))
         refuse_beyond_memory(
-            count * work.bytes_each, f"{count} {work.what} at once", "give fewer processes, {share} times as many"
+            count * work.bytes_each, f"{count} {work.what} at once", fewer_than(count, work.bytes_each, "processes")
         )
         with parcels(work) as waiting:
             return _Run(work, waiting, self._workers, count, report).values()
@@ -65,6 +67,7 @@ class _Run:
         self._ledger: Ledger[Any] = Ledger(work, report)
         self._left = deque(range(len(parcels)))
         self._begun = [0] * len(parcels)
+        self._never_ready = 0
 
     def values(self) -> list[Any]:
         """Results in the order of the tasks."""
@@ -96,7 +99,7 @@ class _Run:
             self._lost(worker)
             return
         if content == READY:
-            worker.is_ready = True
+            worker.is_ready, self._never_ready = True, 0
             return
         task, worker.task = worker.task, None
         assert task is not None
@@ -107,6 +110,8 @@ class _Run:
         self._workers.remove(worker)
         ending = worker.end(at_once=False)
         if not worker.is_ready:
+            self._never_ready += 1
+        if self._never_ready >= MOST_TRIES:
             raise InputError(
                 f"a process could not be started ({ending})",
                 "see the lines above; a script begins its work under: if __name__ == '__main__':",
@@ -124,12 +129,13 @@ class _Worker:
     """A process, the line to it, and the number of the task that it does; None where it has none."""
 
     def __init__(self) -> None:
-        context = get_context("spawn")
-        self.connection, other = context.Pipe()
+        begin = context()
+        self.connection, other = begin.Pipe()
         self.task: int | None = None
         self.is_ready = False
-        self._process: SpawnProcess = context.Process(target=_serve, args=(other,), daemon=True)
-        with _environment(ONE_THREAD):
+        environment = {**os.environ, **ONE_THREAD}
+        self._process: BaseProcess = begin.Process(target=_serve, args=(other, environment), daemon=True)
+        with environment_of(ONE_THREAD):
             self._process.start()
         other.close()
 
@@ -154,8 +160,11 @@ def wait_for(workers: list[_Worker]) -> list[_Worker]:
     return [worker for worker in workers if worker.connection in heard]
 
 
-def _serve(connection: Connection) -> None:
+def _serve(connection: Connection, environment: dict[str, str]) -> None:
     """What a process does: task after task, until the line is closed."""
+    # the process that this is a copy of may have been begun in another environment
+    os.environ.clear()
+    os.environ.update(environment)
     # an interrupt of the terminal reaches all processes; ours ends the others
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -163,18 +172,3 @@ def _serve(connection: Connection) -> None:
         connection.send_bytes(READY)
         while True:
             connection.send_bytes(perform(connection.recv_bytes()))
-
-
-@contextmanager
-def _environment(values: dict[str, str]) -> Generator[None]:
-    """The variables set while a process is started, which takes them over."""
-    before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

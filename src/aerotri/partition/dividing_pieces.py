@@ -31,13 +31,11 @@ from aerotri.partition.dividing import (
     part_with,
     positions_of,
 )
-from aerotri.partition.ray_files import NamedRays, RayFiles
+from aerotri.partition.ray_files import MOST_OPEN, NamedRays, RayFiles
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-MOST_FILES = 500
-"""Files open at a time: systems allow a thousand or more."""
 Say = Callable[[str, float | None], None]
 
 
@@ -71,7 +69,7 @@ def divided(source: InPieces, parts: int, room: Path, say: Say) -> Iterator[Bloc
         For anything the block format does not allow; when photographs have no position, or nothing can be cut.
     """
     position = positions_of(source.block)
-    count = min(parts, MOST_FILES)
+    count = min(parts, MOST_OPEN)
     say("reading image points", None)
     with RayFiles(room, "points") as by_point:
         for piece in source.pieces():

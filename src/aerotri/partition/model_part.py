@@ -232,7 +232,7 @@ class _PartsModel:
         solver.drop(before)
         if turning.lengths is None or not turning.lengths.arrived:
             raise InputError(
-                f"the model part of σ is not found in {MOST_TURNS} turns",
+                f"the search for errors that groups of photographs share did not end in {MOST_TURNS} steps",
                 'set model_part = "off" in block.toml for σ without it',
             )
         return turning

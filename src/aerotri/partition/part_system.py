@@ -83,7 +83,7 @@ def refuse_robust(name: str) -> None:
     """
     if name not in ROBUST:
         raise InputError(
-            f'robust = "{name}" of a block in parts is not built', 'use "huber", or adjust the block in one piece'
+            f'robust = "{name}" for a block in parts is not available', 'use "huber", or adjust the block in one piece'
         )
 
 
@@ -129,4 +129,4 @@ def refuse_what_parts_cannot(block: Block) -> None:
     ]  # fmt: skip
     for wrong, what, remedy in refused:
         if wrong:
-            raise InputError(what if what.startswith("photograph") else f"{what} is not built", remedy)
+            raise InputError(what if what.startswith("photograph") else f"{what} is not available", remedy)

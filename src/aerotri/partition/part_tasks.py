@@ -163,7 +163,7 @@ def move_part(move: Move, task: PartTask) -> Reduced:
     x = restored(part.system.symbolic, numbers).expand(half, task.there.solution(start.tag))
     step = part.system.whole_step(state, x, start.damping, start.estimator)
     if step is None:
-        return Reduced(np.inf, fault="a step that is no number")
+        return Reduced(np.inf, fault="a step that is not a number")
     there = part.system.unknowns.advance(state, step)
     files.keep_state(there, move.end.state)
     if move.last:

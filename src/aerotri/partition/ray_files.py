@@ -5,10 +5,11 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from aerotri.observations import ImagePoints
 if TYPE_CHECKING:
     import pyarrow as pa
 
+MOST_OPEN = 500
+"""Files open at a time: systems allow a thousand or more."""
 COLUMNS = ("row", "image", "x", "y", "sx", "sy")
 
 
@@ -51,7 +54,7 @@ class RayFiles:
 
     def __init__(self, folder: Path, name: str):
         self._folder, self._name = folder, name
-        self._writers: dict[int, Any] = {}
+        self._open: OrderedDict[int, tuple[Any, BinaryIO]] = OrderedDict()
 
     def __enter__(self) -> Self:
         return self
@@ -59,8 +62,8 @@ class RayFiles:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for writer in self._writers.values():
-            writer.close()
+        while self._open:
+            self._close_oldest()
 
     def append(self, number: np.ndarray, rays: NamedRays) -> None:
         """Every image point to the file of its number, (m,) int."""
@@ -81,8 +84,12 @@ class RayFiles:
         if not path.exists():
             nothing, index = np.zeros((0, 2)), np.zeros(0, np.int64)
             return NamedRays(index, ImagePoints(index, index, nothing, nothing), pa.array([], pa.string()))
-        with pa.ipc.open_stream(path) as file:
-            table = file.read_all()
+        tables, size = [], path.stat().st_size
+        with path.open("rb") as file:
+            while file.tell() < size:
+                with pa.ipc.open_stream(file) as stream:
+                    tables.append(stream.read_all())
+        table = pa.concat_tables(tables)
         row, image, x, y, sx, sy = (table.column(name).to_numpy() for name in COLUMNS)
         order = np.argsort(row, kind="stable")
         point = table.column("point").take(order).combine_chunks().dictionary_encode()
@@ -100,11 +107,21 @@ class RayFiles:
         return self._folder / f"{self._name}_{number}"
 
     def _writer(self, number: int, schema: Any) -> Any:
+        """Of a file that may have been closed before: it then holds one stream after the other."""
         import pyarrow as pa
 
-        if number not in self._writers:
-            self._writers[number] = pa.ipc.new_stream(self._path(number), schema)
-        return self._writers[number]
+        if number not in self._open:
+            if len(self._open) >= MOST_OPEN:
+                self._close_oldest()
+            file = self._path(number).open("ab")
+            self._open[number] = pa.ipc.new_stream(file, schema), file
+        self._open.move_to_end(number)
+        return self._open[number][0]
+
+    def _close_oldest(self) -> None:
+        _, (writer, file) = self._open.popitem(last=False)
+        writer.close()
+        file.close()
 
 
 def _arrow(rays: NamedRays) -> Any:

@@ -235,14 +235,14 @@ def cloud_change(
     if not np.isfinite(found.distance).any():
         raise InputError("the two clouds do not meet", "check the CRS of both, or give a larger --cylinder and --reach")
     stated = (first_adjustment, second_adjustment)
-    found, adjusted, said = by_adjustments(found, epochs, (before, after), stated, plan_code(crs))
+    found, adjusted, said, is_known = by_adjustments(found, epochs, (before, after), stated, plan_code(crs))
     notes = [text for text in (of_heights, unlike, *said) if text]
     held = None if stable is None else within(stable, plan_code(crs), core)
     on_stable = None if held is None else registration_of(found, held)
     if on_stable is not None and not np.isfinite(on_stable[1]):
         raise InputError("no place with a distance lies on the stable ground", "give other ground, or check its CRS")
     used = registration if registration is not None else on_stable[1] if on_stable is not None else 0.0
-    if registration is None and held is None and adjusted is None and "cancel" not in " ".join(said):
+    if registration is None and held is None and not is_known:
         notes.append("nothing is known of how the clouds lie to one another: give --stable or --registration")
     sources = (one for one in (second_adjustment, second, first_adjustment, first) if not isinstance(one, np.ndarray))
     head = Head(project_of(project, *sources), crs)

@@ -118,8 +118,9 @@ def known_alike(first: Cloud, second: Cloud) -> tuple[Cloud, Cloud, str]:
 def by_adjustments(
     found: CloudDistances, epochs: tuple[CloudEpoch, CloudEpoch], clouds: tuple[Cloud, Cloud],
     adjustments: tuple[Adjustment | FilePath | None, ...], epsg: int | None,
-) -> tuple[CloudDistances, AdjustedDistances | None, list[str]]:  # fmt: skip
-    """The distances with a σ that knows the adjustments as far as they are known, and sentences about them.
+) -> tuple[CloudDistances, AdjustedDistances | None, list[str], bool]:  # fmt: skip
+    """The distances with a σ that knows the adjustments as far as they are known, sentences about them, and whether how
+    the clouds lie to one another is known of them.
 
     Parameters
     ----------
@@ -145,18 +146,18 @@ def by_adjustments(
     records = (first.record, first.record if second.is_same(first) else second.record)
     adjusted = adjusted_distances(found, clouds, records)
     said = [one.doubt for one in (first, second) if one.doubt]
-    return with_adjustments(found, clouds, adjusted), adjusted, [*said, adjusted.words]
+    return with_adjustments(found, clouds, adjusted), adjusted, [*said, adjusted.words], True
 
 
 def _of_one_adjustment(
     found: CloudDistances, epochs: tuple[CloudEpoch, CloudEpoch], clouds: tuple[Cloud, Cloud]
-) -> tuple[CloudDistances, None, list[str]]:
+) -> tuple[CloudDistances, None, list[str], bool]:
     """Where dsm.json beside both names one adjustment, its errors cancel and the noise of matching is left."""
     same = epochs[0].key != "" and epochs[0].key == epochs[1].key
     if same and all(cloud.matching is not None for cloud in clouds):
         return (
             found.with_variances(found.noise.sum(axis=1)), None,
-            ["both clouds come from one adjustment: its errors cancel"],
+            ["both clouds come from one adjustment: its errors cancel"], True,
         )  # fmt: skip
     said = []
     if all(cloud.covariance is not None for cloud in clouds):
@@ -164,7 +165,7 @@ def _of_one_adjustment(
             "what the adjustments of both clouds have in common, such as control points, is not known and makes σ too "
             "large: give both, --first-adjustment and --second-adjustment"
         )
-    return found, None, said
+    return found, None, said, False
 
 
 def default_width(xyz: np.ndarray) -> float:

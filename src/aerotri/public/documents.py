@@ -146,7 +146,15 @@ def certificate(
     certificates = {
         VOLUME: volume_certificate, CHANGE: change_certificate, CLOUD_CHANGE: cloud_change_certificate,
     }  # fmt: skip
-    found = certificates[record](content, plots, context)
+    try:
+        found = certificates[record](content, plots, context)
+    except (KeyError, TypeError) as error:
+        if folder is None:
+            raise
+        raise InputError(
+            f"was written by another version ({_version(content)}): {error}", "compute the result again",
+            folder / record,
+        ) from error  # fmt: skip
     return Made(OF_VOLUME if record == VOLUME else OF_CHANGE, pdf_of(found, made), notes)
 
 

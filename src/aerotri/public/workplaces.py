@@ -24,7 +24,7 @@ def workplace(executor: str, scratch: FilePath | None, say: Say) -> Generator[Wo
     Raises
     ------
     InputError
-        When it is no executor, or cannot be reached.
+        When it is not an executor, or cannot be reached.
     """
     from aerotri.formats.files.spool import Spool
 

@@ -96,10 +96,15 @@ def weakest_modes(system: NormalSystem, solution: Solution, factor: Factor) -> M
     Parameters
     ----------
     factor : undamped, at the solution.
+
+    Raises
+    ------
+    ValueError
+        When there are no `candidates`.
     """
     u = system.unknowns
-    rows = candidates(u)
-    rows = rows[np.diff(u.rays.start)[rows] >= min(FEWEST_RAYS, int(np.diff(u.rays.start).max(initial=0)))]
+    rows, rays = candidates(u), np.diff(u.rays.start)
+    rows = rows[rays[rows] >= min(FEWEST_RAYS, int(rays[rows].max(initial=0)))]
     rows = rows[thinned(u.block.points[u.points[rows]])]
     rows = rows[spread(solution.state.points[rows, :2])]
     size = 3 * len(rows)

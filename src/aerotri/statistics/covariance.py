@@ -44,6 +44,25 @@ class InnerDatum:
         motion = np.einsum("pid,pik->dk", self.conditions, points)
         return images - self.images @ motion, shared - self.shared @ motion, points - self.points @ motion
 
+    def correction(self, unknowns: np.ndarray, size: int = 1) -> np.ndarray:
+        """(k/size, size, size) what CᵀQC of every `size` functions gains on the way from the minimal datum.
+
+        CᵀSQSᵀC = CᵀQC − MᵀK − KᵀM + Mᵀ·(AQAᵀ)·M with M = GᵀC and K = AQ·C.
+
+        Parameters
+        ----------
+        unknowns : (6n + s, k) partials C of the functions by the unknowns of the reduced system.
+        """
+        n, d = 6 * len(self.images), len(self.both)
+        images, shared = unknowns[:n].reshape(len(self.images), 6, -1), unknowns[n:]
+        moved, known = (
+            (np.einsum("nid,nik->dk", by_images, images) + by_shared.T @ shared).reshape(d, -1, size)
+            for by_images, by_shared in ((self.images, self.shared), (self.q_images, self.q_shared))
+        )
+        mixed = np.einsum("dki,dkj->kij", moved, known)
+        both = np.einsum("dki,de,ekj->kij", moved, self.both, moved, optimize=True)
+        return both - mixed - np.swapaxes(mixed, 1, 2)
+
 
 @dataclass(frozen=True, eq=False)
 class Cofactors:
@@ -79,9 +98,14 @@ def cofactors(system: NormalSystem, state: State, factor: Factor, estimator: Est
         points, redundancy = point_cofactors(system, state, inverse, estimator)
     images, border = _without_held(system.unknowns, inverse)
     result = Cofactors(images, inverse.corner, points, border, redundancy, inverse)
-    if system.unknowns.block.settings.adjustment.datum == "inner" and system.unknowns.motions.count:
+    if is_inner(system):
         return transform_datum(result, inner_datum(system, state, factor, estimator))
     return result
+
+
+def is_inner(system: NormalSystem) -> bool:
+    """Whether the covariances of the block are those of an inner datum, while Q of its factor is of a minimal one."""
+    return system.unknowns.block.settings.adjustment.datum == "inner" and system.unknowns.motions.count > 0
 
 
 def _without_held(unknowns: Unknowns, inverse: Inverse) -> tuple[np.ndarray, np.ndarray]:

@@ -26,6 +26,7 @@ from aerotri.statistics.cluster_test import (
     LEVEL,
     Settled,
     Squares,
+    candidates,
     compare_clusters,
     sum_of_squares,
     untestable,
@@ -98,6 +99,9 @@ def squares_by(system: NormalSystem, solution: Solution, factor: Factor) -> Squa
     ----------
     factor : undamped, at the solution.
     """
+    if not len(candidates(system.unknowns)):
+        # a test field of which all points are held: nothing of the ground can be deformed
+        return lambda clusters: (0.0, 0)
     modes = weakest_modes(system, solution, factor)
     return lambda clusters: sum_of_squares(system, solution, factor, modes, clusters)
 

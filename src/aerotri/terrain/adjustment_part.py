@@ -1,7 +1,8 @@
 """What the adjustment adds to the variance of pickets: they are intersected with an orientation that has its own σ.
 
 [D] The ideal rays l = m − d(m; p) of a picket give dP = −G·(∂π/∂θ·dθ + ∂d/∂p·dp), G = (AᵀA)⁻¹Aᵀ of its intersection.
-With J = dP/dx over all unknowns x of the reduced system its covariance is σ̂0²·J·Q·Jᵀ, by a solution with the factor.
+With J = dP/dx over all unknowns x of the reduced system its covariance is σ̂0²·J·Q·Jᵀ, by a solution with the factor;
+in the inner datum of a free block where the block has it, as its points.
 Where groups of photographs share errors it has a model part. Where the residuals show that the parameters leave image
 errors it has the part of these, through the orientation and at the rays of the picket itself
 (`statistics.camera_field`). It changes slowly over the ground: some pickets tell it for all.
@@ -12,20 +13,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from aerotri.deformation.error_parameters import error_rows, shared_columns
 from aerotri.deformation.model_grid import places_of
+from aerotri.deformation.orientation import Orientation
 from aerotri.deformation.restitution import Restitution
-from aerotri.functional_model.collinearity import RayPartials, linearise
+from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, RayPartials, linearise
+from aerotri.rasters.between_places import between_places, lattice_of, spread_places
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.camera_field import CameraField, is_of_camera
+from aerotri.statistics.covariance import inner_datum, is_inner
 from aerotri.statistics.model_of_functions import model_of_functions
 from aerotri.terrain.pickets import Pickets
 
 MOST_PLACES, AT_A_TIME = 500, 100
 """Pickets whose variance is computed, the others interpolated, and how many at a time; chosen [C]: this variance
 changes slowly over a block, and 100 at a time, 300 columns of the inverse, fit into memory."""
+RAYS_AT_A_TIME = 50_000
+"""Rays whose partials are computed at a time: 400 bytes each."""
 
 
 def adjustment_variances(
@@ -35,19 +40,18 @@ def adjustment_variances(
 
     Parameters
     ----------
-    of : the restitution the pickets were measured with. rows : photographs of the block that `pickets.photographs`
+    restitution : with which the pickets were measured. rows : photographs of the block that `pickets.photographs`
         counts.
     """
     measured = np.flatnonzero(np.isfinite(pickets.xyz).all(axis=1))
     out = np.full(pickets.xyz.shape, np.nan)
-    if len(measured) < 4:
+    if not len(measured):
         return out
-    places = measured[:: max(len(measured) // MOST_PLACES, 1)]
+    plan, places = pickets.xyz[measured, :2], measured
+    if len(measured) > MOST_PLACES:
+        places = measured[spread_places(plan, lattice_of(plan, MOST_PLACES))]
     variances = variances_at(calibration, restitution, rows, pickets.xyz[places], pickets.photographs[places])
-    at = pickets.xyz[places, :2]
-    values = NearestNDInterpolator(at, variances)(pickets.xyz[measured, :2])
-    linear = LinearNDInterpolator(at, variances)(pickets.xyz[measured, :2])
-    out[measured] = np.where(np.isfinite(linear), linear, values)
+    out[measured] = between_places(pickets.xyz[places, :2], variances, plan)
     return out
 
 
@@ -76,6 +80,36 @@ def covariances_at(
     return _covariances(calibration, restitution.left, local, partials, 3)
 
 
+def change_covariances(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: tuple[np.ndarray, np.ndarray],
+    photographs: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:  # fmt: skip
+    """(n, 3, 3) m² in the CRS, of second less first places (n, 3) near one another, intersected from photographs."""
+    local = [places_of(calibration).to_local(one) for one in xyz]
+
+    def partials(part: slice) -> np.ndarray:
+        first, second = (
+            _by_unknowns(calibration, restitution, rows, at[part], seen[part], plan=False)
+            for at, seen in zip(local, photographs, strict=True)
+        )
+        return second - first
+
+    return _covariances(calibration, restitution.left, local[0], partials, 3)
+
+
+def solved_partials(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photographs: np.ndarray
+) -> np.ndarray:
+    """(u, n, 3) Q·Jᵀ of the coordinates in the CRS, by the u unknowns of the reduced system; as `variances_at`."""
+    places, system = places_of(calibration), calibration.system
+    factor, local = system.factorise(calibration.solution.equations), places.to_local(xyz)
+    count = 6 * len(system.unknowns.images) + len(system.unknowns.shared)
+    j = _by_unknowns(calibration, restitution, rows, local, photographs, plan=False)[:, :, :count]
+    if places.frame is not None:
+        j = places.frame.crs_per_local(local) @ j
+    return factor.solve(np.ascontiguousarray(j.reshape(-1, count).T)).reshape(count, len(xyz), 3)
+
+
 def plan_covariances(
     calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photograph: np.ndarray
 ) -> np.ndarray:
@@ -91,6 +125,24 @@ def plan_covariances(
         return _by_unknowns(calibration, restitution, rows, local[part], photograph[part, None], plan=True)
 
     return _covariances(calibration, restitution.left, local, partials, 3)[:, :2, :2].copy()
+
+
+def plan_of_images(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photograph: np.ndarray
+) -> np.ndarray:
+    """(n, 2, 2) m²/mm², of X and Y in the CRS, by an image position with σ of 1 mm in x and y; as `plan_covariances`.
+
+    G·Gᵀ, G the inverse of the partials of the image position by X and Y: of an oblique ray more than of a vertical one.
+    """
+    frame, image = places_of(calibration), rows[photograph]
+    found = np.empty((len(xyz), 2, 2))
+    for first in range(0, len(xyz), RAYS_AT_A_TIME):
+        part = slice(first, first + RAYS_AT_A_TIME)
+        local = frame.to_local(xyz[part])
+        rays = _linearised(restitution.true, local, image[part], np.arange(len(local)), len(INTERIOR_COLUMNS))
+        gain = _gain_in_plan(rays.by_point)
+        found[part] = frame.covariances(local, gain @ np.swapaxes(gain, 1, 2))[:, :2, :2]
+    return found
 
 
 def shown_covariances(
@@ -133,9 +185,10 @@ def _covariances(
     left : what the parameters leave of image errors. local : (n, 3) m in the frame.
     partials : (k, size, u + f) of some places, by the unknowns of the reduced system, then by the patterns of `left`.
     """
-    frame = places_of(calibration)
-    factor = calibration.system.factorise(calibration.solution.equations)
-    count = 6 * len(calibration.system.unknowns.images) + len(calibration.system.unknowns.shared)
+    system, solution = calibration.system, calibration.solution
+    frame, factor = places_of(calibration), system.factorise(solution.equations)
+    inner = inner_datum(system, solution.state, factor, solution.estimator) if is_inner(system) else None
+    count = 6 * len(system.unknowns.images) + len(system.unknowns.shared)
     covariances = np.empty((len(local), size, size))
     for first in range(0, len(local), AT_A_TIME):
         part = slice(first, first + AT_A_TIME)
@@ -143,10 +196,12 @@ def _covariances(
         by_columns = np.ascontiguousarray(j.reshape(-1, count).T)
         q = factor.solve(by_columns)
         both = np.einsum("nau,unb->nab", j, q.reshape(count, len(j), size))
+        if inner is not None:
+            both = both + inner.correction(by_columns, size)
         covariance = (calibration.local.outcome.sigma0 if left is None else left.noise) ** 2 * both
         if calibration.model is not None and not (left is not None and is_of_camera(calibration)):
             covariance = covariance + model_of_functions(
-                calibration.system, calibration.solution, calibration.model, by_columns, q, size
+                system, solution, calibration.model, by_columns, q, size, None if inner is None else both
             )
         if left is not None:
             by_errors = by_errors + j @ left.by_unknowns
@@ -176,6 +231,18 @@ def _by_scans(calibration: Adjustment, rays: RayPartials, own: np.ndarray) -> It
             yield np.where(first >= 0, first + axis, -1), tau[:, :, 0] * by[:, :, axis]
 
 
+def _linearised(
+    orientation: Orientation, local: np.ndarray, image: np.ndarray, point: np.ndarray, size: int
+) -> RayPartials:
+    """Of rays from points (n, 3) m in the frame, point (r,), to photographs image (r,), `size` interior elements."""
+    interior = np.zeros((len(orientation), size))
+    interior[:, :3] = orientation.interior
+    return linearise(
+        np.ascontiguousarray(np.nan_to_num(orientation.rotation)), np.ascontiguousarray(orientation.centre), local,
+        interior, image, point, image, np.zeros((len(image), 2)),
+    )  # fmt: skip
+
+
 def _gain(by_point: np.ndarray, picket: np.ndarray, count: int) -> np.ndarray:
     """(r, 3, 2) of rays, by which the points that they intersect in move."""
     normal = np.zeros((count, 3, 3))
@@ -203,13 +270,7 @@ def _by_unknowns(
     in_system[u.images] = np.arange(len(u.images))
     picket, column = np.nonzero(photographs >= 0)
     image = rows[photographs[picket, column]]
-    orientation = restitution.true
-    interior = np.zeros((len(orientation), u.lens.base.shape[1]))
-    interior[:, :3] = orientation.interior
-    rays = linearise(
-        np.ascontiguousarray(np.nan_to_num(orientation.rotation)), np.ascontiguousarray(orientation.centre), local,
-        interior, image, picket, image, np.zeros((len(image), 2)),
-    )  # fmt: skip
+    rays = _linearised(restitution.true, local, image, picket, u.lens.base.shape[1])
     gain = _gain_in_plan(rays.by_point) if plan else _gain(rays.by_point, picket, len(local))
     own = in_system[image]
     by_image = rays.by_orientation.copy()

@@ -1,7 +1,7 @@
 """Surfaces on grids: from pickets by their TIN, each cell with its σ; what interpolation costs; ground without objects.
 
 σ of a cell holds the σ of the pickets around it and the error of interpolation between them. The latter is measured on
-the pickets themselves: a part of them is left out and foretold by the others, at two and at four times the interval;
+the pickets themselves: a part of them is left out and predicted by the others, at two and at four times the interval;
 the power law between the two leads to the interval itself [D].
 """
 

@@ -43,7 +43,8 @@ def with_sigma_of_ties(block: Block, offset_px: np.ndarray, ties: int) -> tuple[
     common = float(np.median(sigma[own])) if own.any() else float(np.median(sigma))
     settings = replace(block.settings, image_sigma_um=1e3 * common)
     found = replace(block, image_points=replace(rays, sigma=sigma), settings=settings)
-    return found, common / block.cameras[0].pixel_mm
+    used = own if own.any() else np.ones(len(sigma), bool)
+    return found, float(np.median(sigma[used] / pixel[used, None]))
 
 
 def adjusted_offsets(local: Block, points: np.ndarray, offset_px: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ RIM = kernels.HALF + 1
 """Pixels of a window with what its slopes need, on either side of its middle."""
 BROWN_ROUNDS = 5
 """Brown's errors belong to the measured position, which is sought."""
-REACH_KNOWN, REACH_FORETOLD = 2.0, 4.0
+REACH_KNOWN, REACH_PREDICTED = 2.0, 4.0
 """Pixels that a window may lie from a feature, and from where the orientation alone puts it [C]: beyond, least squares
 finds other texture."""
 LEAST_CORRELATION = 0.7
@@ -235,7 +235,7 @@ def _found_in(
     inside &= ((place > RIM) & (place < view.size_px[number] - RIM)).all(axis=1)
     point, place, slope, known = point[inside], place[inside], slope[inside], known[inside]
     told = np.full((len(point), 2), np.nan)
-    reach = np.where(known, REACH_KNOWN, REACH_FORETOLD)
+    reach = np.where(known, REACH_KNOWN, REACH_PREDICTED)
     kernels.match_windows(greys(number), chosen.windows, point, reach, place, slope, told)
     good = (told[:, 0] >= LEAST_CORRELATION) & (told[:, 1] <= LARGEST_SIGMA_PX)
     return np.concatenate([own, point[good]]), np.concatenate([chosen.middle[own], place[good]])

@@ -214,30 +214,69 @@ def respond(first, last, pickets, photos, tiles, out):
 
 
 @kernel
-def nearest_photographs(points, block, first, candidate, views, chosen):
+def shows(i, point, views):
+    """Whether photograph i has a point (3,) within its format."""
+    rotation, centre, interior, half = views.rotation, views.centre, views.interior, views.half
+    dx, dy, dz = point[0] - centre[i, 0], point[1] - centre[i, 1], point[2] - centre[i, 2]
+    u = -(rotation[i, 0, 2] * dx + rotation[i, 1, 2] * dy + rotation[i, 2, 2] * dz)
+    if u <= 0.0:
+        return False
+    scale = interior[i, 0] / u
+    across = rotation[i, 0, 0] * dx + rotation[i, 1, 0] * dy + rotation[i, 2, 0] * dz
+    along = rotation[i, 0, 1] * dx + rotation[i, 1, 1] * dy + rotation[i, 2, 1] * dz
+    x, y = interior[i, 1] + scale * across, interior[i, 2] + scale * along
+    return abs(x) <= half[i, 0] and abs(y) <= half[i, 1]
+
+
+@kernel
+def angle_between(point, one, other):
+    """Radians between the rays from a point (3,) to two centres (3,)."""
+    ax, ay, az = one[0] - point[0], one[1] - point[1], one[2] - point[2]
+    bx, by, bz = other[0] - point[0], other[1] - point[1], other[2] - point[2]
+    cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    return np.arctan2(np.sqrt(cx * cx + cy * cy + cz * cz), ax * bx + ay * by + az * bz)
+
+
+@kernel
+def partner_of(first, point, candidates, views, least, weakest):
+    """The nearest photograph whose ray makes an angle with that of the first, −1 where none has the weakest.
+
+    Where none has the least, that of the largest angle.
+    """
+    centre = views.centre
+    nearest, widest, away_of_nearest, largest = -1, -1, np.inf, weakest
+    for i in candidates:
+        dx, dy = point[0] - centre[i, 0], point[1] - centre[i, 1]
+        away = dx * dx + dy * dy
+        if i == first or (away >= away_of_nearest) or not shows(i, point, views):
+            continue
+        angle = angle_between(point, centre[first], centre[i])
+        if angle >= least:
+            nearest, away_of_nearest = i, away
+        elif angle >= largest:
+            widest, largest = i, angle
+    return nearest if nearest >= 0 else widest
+
+
+@kernel
+def nearest_photographs(points, block, first, candidate, views, least, weakest, chosen):
     """The photographs that see each point and whose centres are nearest to it in plan; −1 where there are fewer.
 
-    points (k, 3); block (k) of candidates: candidate[first[b] : first[b + 1]]; chosen (k, m) out.
+    The nearest is followed by the nearest of those whose rays make an angle of `least` with its own, or the largest
+    angle where none does, then by the others by distance. Where no angle reaches `weakest`, the nearest is alone: the
+    height of a point that was seen from one place is not known.
+
+    points (k, 3); block (k) of candidates: candidate[first[b] : first[b + 1]]; angles in radians; chosen (k, m) out.
     """
-    rotation, centre, interior, half = views.rotation, views.centre, views.interior, views.half
-    m = chosen.shape[1]
+    centre, m = views.centre, chosen.shape[1]
     distance = np.empty(m)
     for p in range(len(points)):
+        own = candidate[first[block[p]] : first[block[p] + 1]]
         found = 0
-        for c in range(first[block[p]], first[block[p] + 1]):
-            i = candidate[c]
-            dx, dy, dz = points[p, 0] - centre[i, 0], points[p, 1] - centre[i, 1], points[p, 2] - centre[i, 2]
+        for i in own:
+            dx, dy = points[p, 0] - centre[i, 0], points[p, 1] - centre[i, 1]
             away = dx * dx + dy * dy
-            if found == m and away >= distance[m - 1]:
-                continue
-            u = -(rotation[i, 0, 2] * dx + rotation[i, 1, 2] * dy + rotation[i, 2, 2] * dz)
-            if u <= 0.0:
-                continue
-            scale = interior[i, 0] / u
-            across = rotation[i, 0, 0] * dx + rotation[i, 1, 0] * dy + rotation[i, 2, 0] * dz
-            along = rotation[i, 0, 1] * dx + rotation[i, 1, 1] * dy + rotation[i, 2, 1] * dz
-            x, y = interior[i, 1] + scale * across, interior[i, 2] + scale * along
-            if abs(x) > half[i, 0] or abs(y) > half[i, 1]:
+            if (found == m and away >= distance[m - 1]) or not shows(i, points[p], views):
                 continue
             at = min(found, m - 1)
             while at > 0 and distance[at - 1] > away:
@@ -247,5 +286,16 @@ def nearest_photographs(points, block, first, candidate, views, chosen):
             distance[at] = away
             chosen[p, at] = i
             found = min(found + 1, m)
+        if found >= 2 and angle_between(points[p], centre[chosen[p, 0]], centre[chosen[p, 1]]) < least:
+            partner = partner_of(chosen[p, 0], points[p], own, views, least, weakest)
+            at = found - 1
+            for k in range(1, found):
+                if chosen[p, k] == partner:
+                    at = k
+            while at > 1:
+                chosen[p, at] = chosen[p, at - 1]
+                at -= 1
+            chosen[p, 1] = partner
+            found = found if partner >= 0 else 1
         for at in range(found, m):
             chosen[p, at] = -1

@@ -79,7 +79,11 @@ def _share_above(ground: Ground, tree: KDTree, few: np.ndarray, counted: Counted
 
 
 def _at_places(ground: Ground, tree: KDTree, corners: np.ndarray) -> _Places:
-    """[L: universal kriging] in coordinates of the size of each neighbourhood, as the means over triangles."""
+    """[L: universal kriging] in coordinates of the size of each neighbourhood, as the means over triangles.
+
+    The weights know the noise of the heights, the covariance is of the ground less the same mean of heights without it:
+    what noise does to that mean moves the volume as well, and is its part of matching.
+    """
     middle = corners.mean(axis=1)
     near = np.asarray(tree.query(middle[:, :2], AROUND)[1])
     at = ground.xyz[near][:, :, :2] - middle[:, None, :2]

@@ -11,6 +11,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.image_sigma import image_sigma_of_cameras
 from aerotri.volume.bases import Base, Surface
 from aerotri.volume.between_sides import between_on_side, sigma_at_places, sigma_of_straight_lines
 from aerotri.volume.boundary import Boundary
@@ -128,7 +129,10 @@ def part_of_cells(
         calibration, functional.xyz, matching_sigma_mm(calibration, options), per_point, functional.noise_share
     )
     if not seen.any():
-        raise InputError("no photograph of the adjustment sees the surface", "check the CRS of surface and block")
+        raise InputError(
+            "no two photographs of the adjustment see the surface from different places",
+            "check the CRS of surface and block",
+        )
     sharing = cells_sharing(length, surface.grid.cell_x * surface.grid.cell_y)
     pickets = replace(pickets, noise_share=sharing * shares_of_noise(calibration, pickets, functional.take(seen)))
     response = respond(calibration, pickets, functional.gradient[seen], options.corrected)
@@ -245,10 +249,10 @@ def part_of_measured(
     return part_of_pickets(calibration, pickets, triangulated(pickets.xyz), boundary, base, options, counted)
 
 
-def matching_sigma_mm(calibration: Adjustment, options: SigmaOptions) -> float:
-    """mm, of an image coordinate of a picket."""
-    um = calibration.local.outcome.sigma0_um if options.matching_sigma_um is None else options.matching_sigma_um
-    return 1e-3 * um
+def matching_sigma_mm(calibration: Adjustment, options: SigmaOptions) -> float | np.ndarray:
+    """mm, of an image coordinate of a picket: as stated, or (c,) of every camera as its image points have it."""
+    stated = options.matching_sigma_um
+    return image_sigma_of_cameras(calibration) if stated is None else 1e-3 * stated
 
 
 def _squares(gradient: np.ndarray) -> float:

@@ -11,6 +11,7 @@ from aerotri.deformation.orientation import Orientation, calibrated_orientation
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.observations import Block
 from aerotri.results.adjustment import Adjustment
+from aerotri.terrain.dense.pairs import LEAST_ANGLE, WEAKEST_ANGLE
 from aerotri.volume import _response_kernels as _kernels
 from aerotri.volume.settings import MOST_PER_POINT, PER_POINT
 
@@ -63,12 +64,12 @@ class MeasuredPickets:
     sigma_z: np.ndarray | None = None
 
 
-def pickets_of_names(block: Block, xyz: np.ndarray, names: list[list[str]], sigma_mm: np.ndarray | float) -> Pickets:
+def pickets_of_names(block: Block, xyz: np.ndarray, names: list[list[str]], sigma_mm: float | np.ndarray) -> Pickets:
     """Pickets with the names of their photographs.
 
     Parameters
     ----------
-    names : photographs of every picket. sigma_mm : (k,) of their image coordinates, or one for all.
+    names : photographs of every picket. sigma_mm : of an image coordinate, or (c,) of every camera.
 
     Raises
     ------
@@ -84,19 +85,27 @@ def pickets_of_names(block: Block, xyz: np.ndarray, names: list[list[str]], sigm
         )
     start = np.concatenate([[0], np.cumsum([len(own) for own in names])]).astype(np.int64)
     image = np.array([row[name] for own in names for name in own], dtype=np.int64)
-    sigma = np.repeat(np.broadcast_to(np.asarray(sigma_mm, dtype=float), (len(xyz),)), np.diff(start))
-    return Pickets(np.asarray(xyz, dtype=float), start, image, sigma, np.ones(len(xyz)))
+    return Pickets(np.asarray(xyz, dtype=float), start, image, _of_rays(block, image, sigma_mm), np.ones(len(xyz)))
+
+
+def _of_rays(block: Block, image: np.ndarray, sigma_mm: float | np.ndarray) -> np.ndarray:
+    """(r,) mm of rays in photographs (r,), σ of all or of every camera."""
+    return np.broadcast_to(np.asarray(sigma_mm, dtype=float), (len(block.cameras),))[block.images.camera[image]]
 
 
 def pickets_where_seen(
-    calibration: Adjustment, xyz: np.ndarray, sigma_mm: float, per_point: int | np.ndarray = PER_POINT,
+    calibration: Adjustment, xyz: np.ndarray, sigma_mm: float | np.ndarray, per_point: int | np.ndarray = PER_POINT,
     noise_share: np.ndarray | None = None,
 ) -> tuple[Pickets, np.ndarray]:  # fmt: skip
-    """Pickets at places of a surface, in the photographs nearest to them that see them.
+    """Pickets at places of a surface, in the photographs nearest to them that see them from different places.
+
+    The nearest photograph is taken with the nearest of those whose rays make `LEAST_ANGLE` with its own. A place that
+    is seen from one place only, as by the heads of one camera station, is not seen by enough.
 
     Parameters
     ----------
     xyz : (k, 3) m in the CRS of the block, neighbours in the list near one another.
+    sigma_mm : of an image coordinate, or (c,) of every camera.
     per_point : photographs of all, or (k,) of each: of the nearest so many as see it, and eight at most.
 
     Returns
@@ -119,14 +128,14 @@ def pickets_where_seen(
             np.ascontiguousarray(orientation.rotation), np.ascontiguousarray(orientation.centre),
             np.ascontiguousarray(orientation.interior), half,
         ),
-        chosen,
+        np.radians(LEAST_ANGLE), np.radians(WEAKEST_ANGLE), chosen,
     )  # fmt: skip
     used = np.minimum((chosen >= 0).sum(axis=1), wanted)
     seen = used >= (PER_POINT if each else per_point)
     image = chosen[seen][np.arange(chosen.shape[1]) < used[seen, None]]
     start = np.concatenate([[0], np.cumsum(used[seen])]).astype(np.int64)
     share = np.ones(len(local)) if noise_share is None else noise_share
-    return Pickets(xyz[seen], start, image, np.full(len(image), sigma_mm), share[seen]), seen
+    return Pickets(xyz[seen], start, image, _of_rays(block, image, sigma_mm), share[seen]), seen
 
 
 def _candidates(

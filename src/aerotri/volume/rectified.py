@@ -63,6 +63,7 @@ class Line:
     ----------
     moved : m³, by which an error that all places share is expected to change it. spread : m³, its first-order width
         over the line: the change scatters by spread/√2. noise : m³ that noise alone adds to cut and to fill.
+        between : m³ that triangles lose of either of them; taken account of by itself, not in `mean_square`.
     """
 
     moved: float = 0.0

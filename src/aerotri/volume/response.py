@@ -15,7 +15,8 @@ was adjusted without parameters by c times its change besides.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,26 +24,23 @@ from aerotri.adjustment import scanning
 from aerotri.adjustment.kernel_records import Scans
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.point_sides import expand_sides
-from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.conventions import InputError
 from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials
 from aerotri.deformation.error_parameters import KINDS, error_rows, shared_columns
 from aerotri.deformation.orientation import calibrated_orientation
-from aerotri.deformation.photo_errors import PhotoErrors, errors_by_image, seams_mm
+from aerotri.deformation.photo_errors import PhotoErrors, errors_by_image
 from aerotri.functional_model.additional_parameters import Parameter
 from aerotri.functional_model.additional_parameters.registry import INTERIOR_FAMILIES
 from aerotri.functional_model.rotation import logarithm
-from aerotri.image_errors.tile_grid import Tile, tiles_of
-from aerotri.observations import Block, Camera
+from aerotri.observations import Block
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.camera_field import CameraField, is_of_camera, known_field
-from aerotri.statistics.covariance import inner_datum
+from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE
+from aerotri.statistics.covariance import inner_datum, is_inner
 from aerotri.statistics.model_of_functions import model_of_functions
 from aerotri.volume import _response_kernels as _kernels
+from aerotri.volume.error_nodes import ErrorNodes, nodes_of
 from aerotri.volume.pickets import Pickets
-
-TILE_NODES, FRAME_NODES = 65, 193
-"""Nodes a side of a tile, and of a format without tiles, over which additional parameters are taken as bilinear."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,15 +83,12 @@ class Systematic:
 
 
 @dataclass(frozen=True, eq=False)
-class _Nodes:
-    """Nodes over the tiles of every group of image errors; see `_response_kernels`.
+class _Laid:
+    """What responses of one adjustment have in common: image errors, nodes over them, photographs of the system."""
 
-    tiles : see there. xy : (·, 2) mm, just inside their tiles. of_group : nodes of every group.
-    """
-
-    tiles: _kernels.Tiles
-    xy: np.ndarray
-    of_group: list[slice]
+    errors: tuple[PhotoErrors, ...]
+    nodes: ErrorNodes
+    photos: _kernels.PhotoArrays
 
 
 def respond(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, corrected: bool = True) -> Response:
@@ -109,16 +104,48 @@ def respond(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, cor
     InputError
         When a photograph is not oriented, or the rays of a picket do not determine it.
     """
-    system, state = calibration.system, calibration.solution.state
-    u = system.unknowns
-    rows = error_rows(calibration)
-    errors, number = errors_by_image(calibration, rows)
-    nodes = _nodes_of(errors)
+    return respond_to_all(calibration, pickets, [gradient], corrected)[0]
+
+
+def respond_to_all(
+    calibration: Adjustment, pickets: Pickets, gradients: Sequence[np.ndarray], corrected: bool = True
+) -> list[Response]:
+    """As `respond`, of several functionals of the same pickets, by one solution with one factor."""
+    system, solution = calibration.system, calibration.solution
+    laid = _laid(calibration)
+    found = [_before_solution(calibration, pickets, gradient, laid, corrected) for gradient in gradients]
+    c = np.stack([one.unknowns for one in found], axis=1)
+    factor = system.factorise(solution.equations)
+    solved = factor.solve(c)
+    cofactor = np.einsum("uk,uk->k", c, solved)
+    if is_inner(system):
+        cofactor += inner_datum(system, solution.state, factor, solution.estimator).correction(c)[:, 0, 0]
+    variance, model = calibration.local.outcome.sigma0**2 * cofactor, np.zeros(len(found))
+    if calibration.model is not None and not (known_field(calibration) is not None and is_of_camera(calibration)):
+        own = cofactor[:, None, None]
+        model = model_of_functions(system, solution, calibration.model, c, solved, 1, own)[:, 0, 0]
+    return [
+        replace(one, solved=solved[:, k].copy(), variance=float(variance[k]), model=one.model + float(model[k]))
+        for k, one in enumerate(found)
+    ]
+
+
+def _laid(calibration: Adjustment) -> _Laid:
+    u, state = calibration.system.unknowns, calibration.solution.state
+    errors, number = errors_by_image(calibration, error_rows(calibration))
     photos = _kernels.PhotoArrays(
         np.ascontiguousarray(state.rotation), state.centre, u.interior(state), u.lens.of_image, number[u.images],
         *_scans(calibration),
     )  # fmt: skip
-    by_eo, by_interior, deposits, noise, by_shared, error = _summed(calibration, pickets, gradient, photos, nodes)
+    return _Laid(errors, nodes_of(errors), photos)
+
+
+def _before_solution(
+    calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, laid: _Laid, corrected: bool
+) -> Response:
+    """A response without what a solution with the factor tells; its model part is that of the camera's field alone."""
+    errors, nodes = laid.errors, laid.nodes
+    by_eo, by_interior, deposits, noise, by_shared, error = _summed(calibration, pickets, gradient, laid.photos, nodes)
     by_parameters = -by_shared[shared_columns(calibration)]
     for group, own in zip(errors, nodes.of_group, strict=True):
         used = np.flatnonzero(deposits[own].any(axis=1))
@@ -126,24 +153,19 @@ def respond(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, cor
         by_parameters += np.einsum("na,nap->p", f, group.partials(xy))
         error += float(np.sum(f * group.function.of_measured(xy)))
     c = _in_unknowns(calibration, by_eo, by_interior, by_parameters, corrected)
-    factor = system.factorise(calibration.solution.equations)
-    solved = factor.solve(c)
-    cofactor = float(c @ solved)
-    if u.block.settings.adjustment.datum == "inner" and u.motions.count:
-        cofactor += _inner_correction(calibration, factor, c)
-    variance = calibration.local.outcome.sigma0**2 * cofactor
     model, left = 0.0, known_field(calibration)
     if left is not None:
-        model = _left_by_parameters(left, u.block, errors, nodes, deposits, c)
-    if calibration.model is not None and not (left is not None and is_of_camera(calibration)):
-        solution, root = calibration.solution, calibration.model
-        own = np.full((1, 1, 1), cofactor)
-        model += float(model_of_functions(system, solution, root, c[:, None], solved[:, None], 1, own)[0, 0, 0])
-    return Response(c, solved, variance, model, noise, by_eo, by_interior, by_parameters, error)
+        model = _left_by_parameters(left, calibration.system.unknowns.block, errors, nodes, deposits, c)
+    return Response(c, np.zeros_like(c), 0.0, model, noise, by_eo, by_interior, by_parameters, error)
 
 
 def _left_by_parameters(
-    left: CameraField, block: Block, errors: tuple[PhotoErrors, ...], nodes: _Nodes, deposits: np.ndarray, c: np.ndarray
+    left: CameraField,
+    block: Block,
+    errors: tuple[PhotoErrors, ...],
+    nodes: ErrorNodes,
+    deposits: np.ndarray,
+    c: np.ndarray,
 ) -> float:
     """Variance of V by what the parameters leave of image errors, through the unknowns and at the rays of pickets.
 
@@ -167,14 +189,24 @@ def covariance(calibration: Adjustment, first: Response, second: Response) -> fl
 
 def control_response(calibration: Adjustment, response: Response) -> np.ndarray:
     """(P, 3) ∂V by the given coordinates of the control points, in the order of the system's points."""
-    system = calibration.system
-    u = system.unknowns
-    n = 6 * len(u.images)
-    points = expand_sides(
-        system, calibration.solution.state, response.solved[:n].reshape(-1, 6, 1).copy(),
-        response.solved[n:, None].copy(), np.zeros((len(u.points), 3, 1)), calibration.solution.estimator,
-    )  # fmt: skip
-    return u.prior_weight * points[:, :, 0]
+    return control_responses(calibration, response.solved[:, None])[:, :, 0]
+
+
+def control_responses(
+    calibration: Adjustment, solved: np.ndarray, rows: np.ndarray | slice = slice(None)
+) -> np.ndarray:
+    """(p, 3, k) as `control_response`, of some points, for the solutions Q·c (6n + s, k) of k functionals."""
+    system, solution = calibration.system, calibration.solution
+    u, k = system.unknowns, solved.shape[1]
+    n, weight = 6 * len(u.images), u.prior_weight[rows][:, :, None]
+    out = np.empty((len(weight), 3, k))
+    at_once = int(np.clip(NUMBERS_AT_ONCE / (3 * len(u.points)), 1, max(k, 1)))
+    for own in (slice(first, first + at_once) for first in range(0, k if len(weight) else 0, at_once)):
+        images, shared = solved[:n, own].reshape(len(u.images), 6, -1), np.ascontiguousarray(solved[n:, own])
+        nothing = np.zeros((len(u.points), 3, shared.shape[1]))
+        points = expand_sides(system, solution.state, np.ascontiguousarray(images), shared, nothing, solution.estimator)
+        out[:, :, own] = weight * points[rows]
+    return out
 
 
 def systematic(calibration: Adjustment, response: Response, variant: str = "free") -> Systematic:
@@ -203,7 +235,7 @@ def systematic(calibration: Adjustment, response: Response, variant: str = "free
 
 
 def _summed(
-    calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, photos: _kernels.PhotoArrays, nodes: _Nodes
+    calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, photos: _kernels.PhotoArrays, nodes: ErrorNodes
 ):
     """Sums over the pickets, in threads: by orientation, by interior elements, at the nodes, the noise, by shared
     unknowns of rolling shutters, and what these do where they are left uncorrected."""
@@ -221,20 +253,31 @@ def _summed(
     bounds = chunk_bounds(np.diff(pickets.start).astype(float))
     arrays = _kernels.PicketArrays(pickets.start, image, 1.0 / pickets.sigma_mm, points, along, pickets.noise_share)
     shapes = (len(u.images), 6), u.lens.base.shape, (len(nodes.xy), 2), 1, len(u.shared), 1
-    outs = [_kernels.ResponseSums(*(np.zeros(shape) for shape in shapes)) for _ in bounds]
+    # no chunk where there is no picket: the sums are 0 then
+    outs = [_kernels.ResponseSums(*(np.zeros(shape) for shape in shapes)) for _ in bounds or [None]]
 
     def chunk(k: int) -> int:
         return _kernels.respond(*bounds[k], arrays, photos, nodes.tiles, outs[k])
 
     worst = max(run_chunks(chunk, len(bounds)), default=-1)
     if worst >= 0:
-        raise InputError(
-            f"the rays of ground point (picket) {worst + 1} do not determine it", "remove its row from pickets.parquet"
-        )
+        raise _undetermined(u.block, pickets, worst)
     total = _kernels.ResponseSums(*(np.sum([out[part] for out in outs], axis=0) for part in range(6)))
     return (
         total.by_eo, total.by_interior, total.nodes, float(total.noise[0]), total.by_shared, float(total.moved[0])
     )  # fmt: skip
+
+
+def _undetermined(block: Block, pickets: Pickets, row: int) -> InputError:
+    """Names a picket by its place and its photographs: pickets were sorted, and may be cells of a raster."""
+    x, y = pickets.xyz[row, :2]
+    own = block.images.names[pickets.image[pickets.start[row] : pickets.start[row + 1]]]
+    return InputError(
+        f"the rays of the ground point (picket) at X {x:.2f}, Y {y:.2f} do not determine it; its photographs: "
+        + ", ".join(f"'{name}'" for name in own.tolist()),
+        "leave this point out (of `aerotri dtm`: its row in pickets.parquet), or measure it in photographs from "
+        "different places",
+    )
 
 
 def _scans(calibration: Adjustment) -> Scans:
@@ -253,7 +296,7 @@ def in_frame(calibration: Adjustment, xyz: np.ndarray, gradient: np.ndarray) -> 
     The partials of the CRS are those in the middle of the pickets: they change by 1e-4 in a kilometre.
     """
     frame, origin = calibration.frame, calibration.system.unknowns.origin
-    if frame is None:
+    if frame is None or not len(xyz):
         return np.ascontiguousarray(xyz - origin), np.ascontiguousarray(gradient)
     local = frame.to_local(xyz)
     partials = frame.crs_per_local(local.mean(axis=0)[None])[0]
@@ -281,43 +324,3 @@ def _in_unknowns(
     if not corrected:
         shared[np.isin(kinds, KINDS)] = 0.0
     return np.concatenate([(turned * u.eo_free).ravel(), shared])
-
-
-def _inner_correction(calibration: Adjustment, factor: Factor, c: np.ndarray) -> float:
-    """What leads from the cofactor in the minimal datum to that in the inner one, see `statistics.covariance`."""
-    system, solution = calibration.system, calibration.solution
-    inner = inner_datum(system, solution.state, factor, solution.estimator)
-    n = 6 * len(system.unknowns.images)
-    images, shared = c[:n].reshape(-1, 6), c[n:]
-    moved = np.einsum("nid,ni->d", inner.images, images) + inner.shared.T @ shared
-    known = np.einsum("nid,ni->d", inner.q_images, images) + inner.q_shared.T @ shared
-    return float(moved @ inner.both @ moved - 2.0 * moved @ known)
-
-
-def _nodes_of(errors: tuple[PhotoErrors, ...]) -> _Nodes:
-    """Nodes over every tile of every group."""
-    edges, meta = np.full((len(errors), 2, 2), np.inf), np.zeros((len(errors), 3, 3, 7))
-    parts: list[np.ndarray] = []
-    of_group, count = [], 0
-    for s, group in enumerate(errors):
-        camera, begun = group.camera, count
-        for axis, seams in enumerate(seams_mm(camera)):
-            edges[s, axis, : len(seams)] = seams
-        tiles = tiles_of(camera)
-        nodes = TILE_NODES if len(tiles) > 1 else FRAME_NODES
-        for i, row in enumerate(reversed(tiles)):
-            for j, tile in enumerate(row):
-                x, y = _nodes_over(tile, camera, nodes)
-                meta[s, j, i] = count, nodes, nodes, x[0], y[0], 1.0 / (x[1] - x[0]), 1.0 / (y[1] - y[0])
-                parts.append(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
-                count += nodes * nodes
-        of_group.append(slice(begun, count))
-    return _Nodes(_kernels.Tiles(edges, meta), np.concatenate(parts), of_group)
-
-
-def _nodes_over(tile: Tile, camera: Camera, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """x and y of evenly spaced nodes over a tile, mm."""
-    half = np.array(camera.half_format_mm)
-    low, high = tile.bounds_mm(camera)
-    low, high = np.maximum(low, -half), np.minimum(high, half)
-    return np.linspace(low[0], high[0], count), np.linspace(low[1], high[1], count)

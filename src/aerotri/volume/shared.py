@@ -19,7 +19,7 @@ from aerotri.adjustment.scanning import READOUT
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume.parts import Measured, Part
 from aerotri.volume.pickets import Pickets
-from aerotri.volume.response import control_response, respond
+from aerotri.volume.response import Response, control_response, control_responses, respond, respond_to_all
 from aerotri.volume.roughness import Between
 
 OF_CAMERA = ("interior", "additional", rigging.KIND)
@@ -60,6 +60,18 @@ def difference_part(surface: Part, base: Part, corrected: bool, of_side: bool = 
     rays = len(joint.pickets.image)
     part = Part(surface.calibration, response, between, len(joint.pickets), rays, surface.unseen + base.unseen, joint)
     return part, float(min(common))
+
+
+def difference_responses(pairs: Sequence[tuple[Part, Part]]) -> list[Response]:
+    """The responses of first less second functionals, all of the same pickets of two surfaces of one adjustment."""
+    joints = [_joined(_measured_of(one), _measured_of(other))[0] for one, other in pairs]
+    return respond_to_all(pairs[0][0].calibration, joints[0].pickets, [joint.gradient for joint in joints])
+
+
+def _measured_of(part: Part) -> Measured:
+    if part.measured is None:
+        raise ValueError("the pickets of both surfaces are needed")
+    return part.measured
 
 
 def summed_part(parts: Sequence[Part], corrected: bool) -> Part:
@@ -167,7 +179,9 @@ def shared_control_covariance(first: Part, second: Part) -> float:
 
     [D] An error of a given coordinate moves both: Σ h'·h''·σ² over the coordinates shared, h = ∂V/∂(given coordinate).
     """
-    total = sum(float(np.sum(h * k * variance)) for h, k, variance in _shared_control(first, second))
+    rows, variance = _shared_control(first.calibration, second.calibration)
+    h, k = (control_response(one.calibration, one.response) for one in (first, second))
+    total = float(np.sum(h[rows[0]] * k[rows[1]] * variance))
     s0 = [one.calibration.local.outcome.sigma0 for one in (first, second)]
     return s0[0] * s0[1] * total
 
@@ -177,21 +191,47 @@ def shared_camera_covariance(first: Part, second: Part) -> float:
 
     [D] As of control: the error of a value that both observed moves both, h'·h''·σ², h = ∂V/∂(observed value).
     """
-    sides = [_observed_camera(one) for one in (first, second)]
+    sides = [_observed_camera(one.calibration, one.response.solved) for one in (first, second)]
     common = sides[0].keys() & sides[1].keys()
     s0 = [one.calibration.local.outcome.sigma0 for one in (first, second)]
-    return s0[0] * s0[1] * sum(sides[0][key] * sides[1][key] / key[3] for key in sorted(common))
+    return s0[0] * s0[1] * float(sum(sides[0][key] * sides[1][key] / key[3] for key in sorted(common)))
 
 
-def _observed_camera(part: Part) -> dict[tuple[str, str, float, float], float]:
-    """∂V by every observed value of a camera: by name, camera, value and weight 1/σ²."""
-    system = part.calibration.system
-    shared, priors = system.unknowns.shared, system.priors
-    solved = part.response.solved[-len(shared) :] if len(shared) else np.zeros(0)
+def shared_covariances(
+    calibrations: tuple[Adjustment, Adjustment], solved: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """(n, 3, 3) covariances of n places of one adjustment with those of another, by control and camera they share.
+
+    Parameters
+    ----------
+    solved : (6n + s, n, 3) solutions Q·c for the coordinates of the places, of either adjustment.
+    """
+    rows, variance = _shared_control(*calibrations)
+    h, k = (
+        control_responses(one, columns.reshape(len(columns), -1), own).reshape(len(own), 3, *columns.shape[1:])
+        for one, columns, own in zip(calibrations, solved, rows, strict=True)
+    )
+    total = np.einsum("pcna,pcnb,pc->nab", h, k, variance, optimize=True)
+    first, second = (_observed_camera(one, columns) for one, columns in zip(calibrations, solved, strict=True))
+    for key in sorted(first.keys() & second.keys()):
+        total += first[key][:, :, None] * second[key][:, None, :] / key[3]
+    s0 = [one.local.outcome.sigma0 for one in calibrations]
+    return s0[0] * s0[1] * total
+
+
+def _observed_camera(calibration: Adjustment, solved: np.ndarray) -> dict[tuple[str, str, float, float], np.ndarray]:
+    """∂V (…) by every observed value of a camera: by name, camera, value and weight 1/σ².
+
+    Parameters
+    ----------
+    solved : (6n + s, …) Q·c.
+    """
+    shared, priors = calibration.system.unknowns.shared, calibration.system.priors
+    own = solved[len(solved) - len(shared) :]
     return {
-        (str(name), str(group), float(value), float(weight)): float(weight * by)
+        (str(name), str(group), float(value), float(weight)): weight * by
         for name, group, kind, value, weight, by in zip(
-            shared.names, shared.groups, shared.kinds, priors.value, priors.weight, solved, strict=True
+            shared.names, shared.groups, shared.kinds, priors.value, priors.weight, own, strict=True
         )
         if weight > 0.0 and (kind in OF_CAMERA or name == READOUT)
     }
@@ -204,8 +244,9 @@ def shared_in_words(first: Part, second: Part, names: tuple[str, str] = ("surfac
     ----------
     names : of the two, as the sentence calls them.
     """
-    points = sum(bool(np.any(variance)) for _, _, variance in _shared_control(first, second))
-    values = len(_observed_camera(first).keys() & _observed_camera(second).keys())
+    points = int(_shared_control(first.calibration, second.calibration)[1].any(axis=1).sum())
+    observed = [_observed_camera(one.calibration, one.response.solved).keys() for one in (first, second)]
+    values = len(observed[0] & observed[1])
     images = [set(one.calibration.result.block.images.names.astype(str).tolist()) for one in (first, second)]
     photographs = len(images[0] & images[1])
     said = f"{names[0]} and {names[1]} come from two adjustments, taken for independent"
@@ -224,23 +265,24 @@ def shared_in_words(first: Part, second: Part, names: tuple[str, str] = ("surfac
     return said
 
 
-def _shared_control(first: Part, second: Part) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """For every control point of both: the responses (3,) of either, and the variances (3,) of equal coordinates."""
+def _shared_control(first: Adjustment, second: Adjustment) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """Control points of both: their rows in either system, and the variances (p, 3) of equal coordinates, else 0."""
     sides = []
     for one in (first, second):
-        u, block = one.calibration.system.unknowns, one.calibration.result.block
-        row = {int(point): k for k, point in enumerate(u.points)}
-        response = control_response(one.calibration, one.response)
+        row = {int(point): k for k, point in enumerate(one.system.unknowns.points)}
+        block = one.result.block
         sides.append({
-            str(block.points[point]): (xyz, sigma, response[row[int(point)]])
+            str(block.points[point]): (row[int(point)], xyz, sigma)
             for point, xyz, sigma, check in zip(
                 block.control.point, block.control.xyz, block.control.sigma, block.control.is_check, strict=True
             )
             if not check and int(point) in row
         })  # fmt: skip
-    found = []
-    for name in sorted(sides[0].keys() & sides[1].keys()):
-        (xyz, sigma, h), (other, _, k) = sides[0][name], sides[1][name]
+    names = sorted(sides[0].keys() & sides[1].keys())
+    variance = np.zeros((len(names), 3))
+    for k, name in enumerate(names):
+        (_, xyz, sigma), (_, other, _) = sides[0][name], sides[1][name]
         same = np.isfinite(xyz) & (np.abs(xyz - other) < 1e-6)
-        found.append((h, k, np.where(same, np.nan_to_num(sigma) ** 2, 0.0)))
-    return found
+        variance[k] = np.where(same, np.nan_to_num(sigma) ** 2, 0.0)
+    rows = [np.array([side[name][0] for name in names], dtype=np.int64) for side in sides]
+    return (rows[0], rows[1]), variance

@@ -30,7 +30,7 @@ export class NewPointSheet {
     if (this.kind === "tie" && this.bench.names.points.includes(name)) throw new Error(`'${name}' is a point already — give the new point another name`);
     if (this.kind !== "tie") {
       const given = this.values.map(text => text.trim() === "" ? null : Number(text));
-      if (given.some(value => value === null || Number.isNaN(value))) throw new Error("a coordinate or a σ is no number — fill in all six, with a point such as 0.02");
+      if (given.some(value => value === null || Number.isNaN(value))) throw new Error("a coordinate or a σ is not a number — fill in all six, with a point such as 0.02");
       this.bench.takeEdits(await tell("act/give", { point: name, action: this.kind, given }));
     }
     this.bench.newPoint = name;

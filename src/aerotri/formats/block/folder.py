@@ -260,7 +260,7 @@ def _refuse_odd_times(table: Table, times: np.ndarray) -> None:
             usable = False
         if not usable:
             raise table.error(
-                row, f"time = '{text[:40]}' is no number, and a camera has a rolling shutter",
+                row, f"time = '{text[:40]}' is not a number, and a camera has a rolling shutter",
                 "give seconds, such as 45296.25 for 12:34:56.25, or leave it empty",
             )  # fmt: skip
 

@@ -174,7 +174,7 @@ def numbers_of_text(text: bytes, columns: int) -> np.ndarray:
     Raises
     ------
     ValueError
-        When something is no number.
+        When something is not a number.
     """
     import pyarrow as pa
     from pyarrow import csv
@@ -199,5 +199,5 @@ def ids_of_text(values: np.ndarray) -> np.ndarray:
         When one is no such number.
     """
     if not ((values >= 0.0) & (values < EXACT) & (values == np.floor(values))).all():
-        raise ValueError("is no number of an object point")
+        raise ValueError("is not the number of an object point")
     return values.astype(np.uint64)

@@ -52,7 +52,7 @@ class Node:
     def number(self) -> float:
         """A finite number."""
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
-            raise self.error("is no number")
+            raise self.error("is not a number")
         try:
             value = float(self.value)
         except OverflowError:

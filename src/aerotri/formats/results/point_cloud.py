@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
@@ -119,13 +119,20 @@ def read_point_cloud(path: Path, parallel: bool = True) -> tuple[np.ndarray, np.
         xyz = np.column_stack([np.asarray(axis, dtype=float) for axis in (cloud.x, cloud.y, cloud.z)])
         classes = np.asarray(cloud.classification)
     except BaseException as error:
-        # laspy and lazrs raise whatever a damaged file leads to; a panic of lazrs is no Exception
-        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
-            raise
-        raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
+        _refuse_damaged(error, path)
     if not (np.abs(xyz) <= LARGEST_M).all():
         raise InputError("has points at no possible place", "write the file anew, its scale or offset is damaged", path)
     return xyz, classes
+
+
+def _refuse_damaged(error: BaseException, path: Path) -> NoReturn:
+    """Raise what laspy and lazrs raised as a damaged file; an interrupt stays what it is.
+
+    They raise whatever a damaged file leads to; a panic of lazrs is no Exception.
+    """
+    if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+        raise error
+    raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,13 +175,13 @@ def read_precise_cloud(path: Path) -> PreciseCloud:
             np.asarray(cloud[name], dtype=float) if name in there else None for name in (OF_MATCHING, OF_PHOTOGRAPHS)
         )
         system = _code_of(cloud.header.parse_crs())
-    except Exception as error:  # as above
-        raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
+    except BaseException as error:
+        _refuse_damaged(error, path)
     if not {"sigma_x", "sigma_y", "sigma_z"} <= there:
         return PreciseCloud(xyz, None, None, None, system)
     covariance = np.column_stack([*(column**2 for column in columns[:3]), *columns[3:]])
     if not np.isfinite(covariance).all() or (matching is not None and not np.isfinite(matching).all()):
-        raise InputError("has points whose σ is no number", "write the cloud anew", path)
+        raise InputError("has points whose σ is not a number", "write the cloud anew", path)
     return PreciseCloud(xyz, covariance, matching, photographs, system)
 
 
@@ -201,8 +208,8 @@ def _crs_of(path: Path) -> CRS | None:
     try:
         with laspy.open(path) as file:
             return file.header.parse_crs()
-    except Exception as error:  # as above
-        raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
+    except BaseException as error:
+        _refuse_damaged(error, path)
 
 
 def refuse_cloud_units(path: Path) -> None:

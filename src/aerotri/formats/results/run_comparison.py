@@ -58,7 +58,7 @@ def comparison_json(comparison: Comparison, top: int) -> dict[str, Any]:
 
 
 def readable_setting(name: str, value: Any) -> Any:
-    """Additional parameters as the command line takes them; what else is no number or text, as Python writes it."""
+    """Additional parameters as the command line takes them; what else is not a number or text, as Python writes it."""
     if name.endswith("additional_parameters") and value is not None:
         return ",".join(format_parameters(value)) or "none"
     return value

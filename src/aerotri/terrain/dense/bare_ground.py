@@ -17,6 +17,7 @@ from scipy.interpolate import LinearNDInterpolator
 from scipy.ndimage import binary_dilation, binary_erosion, distance_transform_edt, grey_opening, map_coordinates
 from scipy.spatial import QhullError
 
+from aerotri.conventions import InputError
 from aerotri.memory import refuse_beyond_memory
 from aerotri.rasters.grids import Grid
 from aerotri.terrain.dense.tile_files import TileWindow
@@ -268,7 +269,7 @@ def _ground_of_tile(
             continue
         tile = o.files.read(other)
         if tile is None:
-            raise FileNotFoundError(o.files.path(other))
+            raise InputError("was removed while ground was sought", "run the command again", o.files.path(other))
         to = np.s_[top - first[0] : end - first[0], left - first[1] : right - first[1]]
         source = np.s_[top - other.row : end - other.row, left - other.column : right - other.column]
         z[to], sigma[to] = tile.z[source], tile.sigma[source]

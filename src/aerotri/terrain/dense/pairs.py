@@ -12,6 +12,9 @@ LEAST_ANGLE, BEST_ANGLE, LARGEST_ANGLE = 3.0, 15.0, 40.0
 """Degrees between the rays of a pair; chosen [C]: below the least a pixel of parallax is 20 GSD of height, beyond the
 largest the photographs differ too much to be matched densely, and the best lies between; other bounds were
 not compared."""
+WEAKEST_ANGLE = 0.5
+"""Degrees between two rays at least, where nobody knows which photographs measured a place and none makes the least
+angle [C]: a narrow lens has such pairs; heads of one camera station and photographs of a hovering drone have not."""
 LARGEST_OFF_NADIR = 45.0
 """Degrees of a ray from the vertical; beyond, a photograph sees walls rather than ground."""
 GAIN = (1.0, 0.6, 0.4, 0.25, 0.15, 0.1)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
+from aerotri.rasters.between_places import between_places
 from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
 from aerotri.terrain.adjustment_part import covariances_at
@@ -61,15 +61,4 @@ def shared_part(
     high = np.maximum(high, low + 1e-3)
     x, y = np.linspace(low[0], high[0], NODES), np.linspace(high[1], low[1], NODES)
     nodes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    near = NearestNDInterpolator(places[:, :2], six)(nodes)
-    if len(places) < 4 or _in_a_line(places[:, :2]):
-        return SharedPart(x, y, near.reshape(NODES, NODES, 6))
-    linear = LinearNDInterpolator(places[:, :2], six)(nodes)
-    return SharedPart(x, y, np.where(np.isfinite(linear), linear, near).reshape(NODES, NODES, 6))
-
-
-def _in_a_line(xy: np.ndarray) -> bool:
-    """Whether no triangle can be made of places (n, 2) m."""
-    away = xy - xy.mean(axis=0)
-    # of two by two numbers: the linear algebra library gives a matrix of all places to threads that wait for each other
-    return bool(np.linalg.matrix_rank(away.T @ away) < 2)
+    return SharedPart(x, y, between_places(places[:, :2], six, nodes).reshape(NODES, NODES, 6))

@@ -22,7 +22,9 @@ import numpy as np
 
 from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
-from aerotri.terrain.adjustment_part import plan_covariances, shown_covariances
+from aerotri.statistics.image_sigma import image_sigma_of_cameras
+from aerotri.terrain.adjustment_part import plan_covariances, plan_of_images, shown_covariances
+from aerotri.terrain.dense.pairs import WEAKEST_ANGLE
 from aerotri.terrain.ortho.candidates import Candidates
 from aerotri.terrain.ortho.seams import Choice
 from aerotri.terrain.photographs import Photographs
@@ -110,10 +112,7 @@ def plan_accuracy(
     i, j = np.nonzero(choice.number >= 0)
     cells = _cells(photographs, candidates, choice, i, j)
     spread = cells.spread
-    distance = np.abs(cells.xyz[:, 2] - photographs.centres[cells.number, 2])
-    pixel = distance / (photographs.orientation.interior[cells.number, 0] * photographs.sensor[cells.number, 2])
-    image = pixel * _image_sigma_px(calibration, photographs)[cells.number]
-    image = image * np.sqrt(0.5 * np.sum(spread**2, axis=(1, 2)))
+    image = _image_part(calibration, photographs, cells)
     variance, of_height, same = _adjustment_part(calibration, photographs, cells, heights.same)
     orientation, surface = np.sqrt(variance), None
     noise = _noise(heights, cells.xyz, of_height)
@@ -156,11 +155,12 @@ def slopes(z: np.ndarray, grid: Grid) -> np.ndarray:
     return out
 
 
-def _image_sigma_px(calibration: Adjustment, photographs: Photographs) -> np.ndarray:
-    """(n,) σ of a measured image coordinate by photograph, pixels."""
-    rays = calibration.local.block.image_points
-    own = float(np.median(rays.sigma)) if len(rays) else 0.0
-    return calibration.local.outcome.sigma0 * own * photographs.sensor[:, 2]
+def _image_part(calibration: Adjustment, photographs: Photographs, cells: ShownCells) -> np.ndarray:
+    """(n,) m, root mean square of K·G·σ over X and Y, σ of an image coordinate of the camera of each photograph."""
+    sigma = image_sigma_of_cameras(calibration)[calibration.local.block.images.camera[photographs.rows]]
+    of_unit = plan_of_images(calibration, photographs.restitution, photographs.rows, cells.xyz, cells.number)
+    shown = np.einsum("nai,nij,naj->n", cells.spread, of_unit, cells.spread, optimize=True)
+    return sigma[cells.number] * np.sqrt(0.5 * shown)
 
 
 def _adjustment_part(
@@ -168,9 +168,9 @@ def _adjustment_part(
 ) -> tuple[np.ndarray, np.ndarray | None, bool]:
     """(n,) m², mean of X and Y; (n,) m² of the heights where they come from the same adjustment; and whether they do.
 
-    Where no cell is seen by two photographs, nothing is known of how the surface moves.
+    Where no cell is seen by two photographs from different places, nothing is known of how the surface moves.
     """
-    twice = (cells.seen_by >= 0).sum(axis=1) >= 2
+    twice = _seen_with_a_base(photographs, cells) if same else np.zeros(len(cells.xyz), bool)
     same = same and bool(twice.any())
     some = _some(cells.number, twice if same else np.ones(len(twice), bool))
     xyz, number = cells.xyz[some], cells.number[some]
@@ -182,6 +182,18 @@ def _adjustment_part(
         return shown.mean(axis=1), None, False
     both = shown_covariances(*given, cells.seen_by[some])[near]
     return shown_variances(cells, both).mean(axis=1), both[:, 5, 5], True
+
+
+def _seen_with_a_base(photographs: Photographs, cells: ShownCells) -> np.ndarray:
+    """(n,) bool, whether another photograph sees a cell under an angle with the ray of the first of them."""
+    out = np.zeros(len(cells.xyz), bool)
+    least = np.cos(np.radians(WEAKEST_ANGLE))
+    for other in cells.seen_by.T[1:]:
+        two = np.flatnonzero((other >= 0) & (cells.seen_by[:, 0] >= 0) & ~out)
+        one, ray = (photographs.centres[k[two]] - cells.xyz[two] for k in (cells.seen_by[:, 0], other))
+        size = np.linalg.norm(one, axis=1) * np.linalg.norm(ray, axis=1)
+        out[two] = np.einsum("na,na->n", one, ray) <= least * size
+    return out
 
 
 def shown_variances(cells: ShownCells, both: np.ndarray) -> np.ndarray:

@@ -9,26 +9,27 @@ cells are put together in blocks, and σ of single cells is found at some places
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.ndimage import map_coordinates
-from scipy.spatial import KDTree
 
 from aerotri.conventions import InputError
+from aerotri.rasters.between_places import between_places, spread_places
 from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.image_sigma import image_sigma_of_cameras
 from aerotri.volume.bases import Surface
 from aerotri.volume.cell_noise import photographs_at
 from aerotri.volume.change.alignment import Alignment, slopes_of
 from aerotri.volume.functionals import together
 from aerotri.volume.parts import Measured, Part
 from aerotri.volume.pickets import Pickets, pickets_where_seen
-from aerotri.volume.response import respond
+from aerotri.volume.response import respond_to_all
 from aerotri.volume.settings import PER_POINT
 from aerotri.volume.shared import (
-    difference_part,
+    difference_responses,
     same_adjustment,
     shared_camera_covariance,
     shared_control_covariance,
@@ -41,6 +42,8 @@ change covers some models."""
 PLACES = 8
 """Places along a side at which σ of single cells is found."""
 NAMES = ("the first surface", "the second")
+Functional = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Its gradients (b, 3) by the places of both surfaces, and (u,) by what the second was moved by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,12 +66,14 @@ class AdjustedEpoch:
         sums = [together(-slope * weight, factor).ravel() for slope in self.slope]
         return np.stack([*sums, together(weight, factor).ravel()], axis=-1)
 
-    def part(self, gradient: np.ndarray) -> Part:
-        """The share of a functional with a gradient (b, 3)."""
-        own = gradient[self.seen]
-        response = respond(self.calibration, self.pickets, own)
-        measured = Measured(self.pickets, own)
-        return Part(self.calibration, response, None, len(self.pickets), len(self.pickets.image), 0.0, measured)
+    def parts(self, gradients: Sequence[np.ndarray]) -> list[Part]:
+        """The shares of functionals with gradients (b, 3)."""
+        pickets, own = self.pickets, [gradient[self.seen] for gradient in gradients]
+        responses = respond_to_all(self.calibration, pickets, own)
+        return [
+            Part(self.calibration, response, None, len(pickets), len(pickets.image), 0.0, Measured(pickets, gradient))
+            for response, gradient in zip(responses, own, strict=True)
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +102,7 @@ class AdjustedPair:
 
     def in_words(self) -> str:
         """What both have in common."""
-        one, two = (epoch.part(np.zeros((len(epoch.seen), 3))) for epoch in (self.first, self.second))
+        one, two = (epoch.parts([np.zeros((len(epoch.seen), 3))])[0] for epoch in (self.first, self.second))
         return in_common(one, two, NAMES)
 
 
@@ -119,39 +124,48 @@ class AlignedPair:
         """m⁶ of Σ weight·difference, weight (rows, columns) m²: what noise brings, and the model part."""
         pair, own = self.pair, np.where(self.pair.known, weight, 0.0)
         along = np.einsum("rc,rcu->u", own, self.design)
-        return self._of(pair.first.gradient(own, pair.factor), pair.second.gradient(own, pair.factor), along)
+        gradients = pair.first.gradient(own, pair.factor), pair.second.gradient(own, pair.factor)
+        return self._of([(*gradients, along)])[0]
 
     def sigma(self) -> np.ndarray:
         """(rows, columns) m, of the difference of every cell."""
         pair = self.pair
         rows, columns = _places(pair.known)
-        values = np.empty(len(rows))
         across = -(-pair.known.shape[1] // pair.factor)
-        for k, (row, column) in enumerate(zip(rows.tolist(), columns.tolist(), strict=True)):
+        functionals: list[Functional] = []
+        for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
             block = row // pair.factor * across + column // pair.factor
             first, second = np.zeros((len(pair.first.seen), 3)), np.zeros((len(pair.second.seen), 3))
             first[block] = *(-pair.first.slope[:, row, column]), 1.0
             second[block] = *(-pair.second.slope[:, row, column]), 1.0
-            values[k] = np.sqrt(sum(self._of(first, second, self.design[row, column])))
+            functionals.append((first, second, self.design[row, column]))
+        values = np.sqrt([sum(both) for both in self._of(functionals)])
         return _between(pair.known.shape, rows, columns, values)
 
     def unknowns(self) -> np.ndarray:
         """(u,) variances of what the second surface was moved by: what the adjustments bring, with the model part."""
         still = np.zeros(self.design.shape[-1])
         one, two = self.gains
-        return np.array([sum(self._of(one[:, :, k], two[:, :, k], still)) for k in range(len(still))])
+        found = self._of([(one[:, :, k], two[:, :, k], still) for k in range(len(still))])
+        return np.array([sum(both) for both in found])
 
-    def _of(self, first: np.ndarray, second: np.ndarray, along: np.ndarray) -> tuple[float, float]:
-        """Of gradients (b, 3) of a functional by both surfaces, and by the alignment (u,)."""
-        one = self.pair.first.part(first - self.gains[0] @ along)
-        two = self.pair.second.part(second - self.gains[1] @ along)
-        return variances_of_difference(one, two)
+    def _of(self, functionals: Sequence[Functional]) -> list[tuple[float, float]]:
+        """Variances of functionals by noise of the adjustments, and their model parts."""
+        if not functionals:
+            return []
+        first, second = self.gains
+        ones = self.pair.first.parts([one - first @ along for one, _, along in functionals])
+        twos = self.pair.second.parts([two - second @ along for _, two, along in functionals])
+        if same_adjustment(ones[0], twos[0]):
+            joint = difference_responses(list(zip(twos, ones, strict=True)))
+            return [(max(response.variance, 0.0), response.model) for response in joint]
+        return [variances_of_difference(one, two) for one, two in zip(ones, twos, strict=True)]
 
 
 def variances_of_difference(one: Part, two: Part) -> tuple[float, float]:
     """Variance of the second functional less the first by noise of the adjustments, and its model part."""
     if same_adjustment(one, two):
-        joint = difference_part(two, one, True)[0].response
+        joint = difference_responses([(two, one)])[0]
         return max(joint.variance, 0.0), joint.model
     own = one.response.variance + two.response.variance
     both = shared_control_covariance(one, two) + shared_camera_covariance(one, two)
@@ -185,7 +199,7 @@ def adjusted_pair(
     Raises
     ------
     InputError
-        When no photograph of an adjustment sees its surface.
+        When no two photographs of an adjustment see its surface from different places.
     """
     known = np.isfinite(heights[0]) & np.isfinite(heights[1])
     factor = max(1, int(np.ceil(max(known.shape) / MOST_BLOCKS)))
@@ -209,9 +223,12 @@ def _epoch(
     filled = count > 0.0
     own = places[filled]
     per_point = PER_POINT if photographs is None else photographs_at(photographs, own)
-    pickets, seen = pickets_where_seen(calibration, own, 1e-3 * calibration.local.outcome.sigma0_um, per_point)
+    pickets, seen = pickets_where_seen(calibration, own, image_sigma_of_cameras(calibration), per_point)
     if not seen.any():
-        raise InputError(f"no photograph of its adjustment sees {name}", "check which result belongs to it")
+        raise InputError(
+            f"no two photographs of its adjustment see {name} from different places",
+            "check which result belongs to it",
+        )
     every = np.zeros(len(count), bool)
     every[np.flatnonzero(filled)[seen]] = True
     slope = np.stack([np.where(known & np.isfinite(along), along, 0.0) for along in slopes_of(grid, z)])
@@ -219,12 +236,9 @@ def _epoch(
 
 
 def _places(known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of known cells, spread over all of them: those nearest to the nodes of a lattice."""
+    """Rows and columns of known cells, spread over all of them."""
     rows, columns = np.nonzero(known)
-    at_row = np.linspace(rows.min(), rows.max(), PLACES)
-    at_column = np.linspace(columns.min(), columns.max(), PLACES)
-    wanted = np.stack(np.meshgrid(at_row, at_column, indexing="ij"), axis=-1).reshape(-1, 2)
-    chosen = np.unique(KDTree(np.column_stack([rows, columns])).query(wanted)[1])
+    chosen = spread_places(np.column_stack([rows, columns]).astype(float), (PLACES, PLACES))
     return rows[chosen], columns[chosen]
 
 
@@ -233,10 +247,6 @@ def _between(shape: tuple[int, ...], rows: np.ndarray, columns: np.ndarray, valu
     nodes = [np.linspace(0.0, max(n - 1, 1), 2 * PLACES) for n in shape]
     at = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 2)
     own = np.column_stack([rows, columns]).astype(float)
-    table = NearestNDInterpolator(own, values)(at)
-    if len(own) > 3 and np.linalg.matrix_rank(own - own.mean(axis=0)) == 2:
-        linear = LinearNDInterpolator(own, values)(at)
-        table = np.where(np.isfinite(linear), linear, table)
-    table = table.reshape(2 * PLACES, 2 * PLACES)
+    table = between_places(own, values, at).reshape(2 * PLACES, 2 * PLACES)
     row, column = (np.arange(n) * (2 * PLACES - 1) / max(n - 1, 1) for n in shape)
     return map_coordinates(table, np.meshgrid(row, column, indexing="ij"), order=1, mode="nearest")

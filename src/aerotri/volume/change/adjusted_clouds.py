@@ -1,34 +1,40 @@
 """What the adjustments of two epochs bring into distances of their point clouds, with what they have in common.
 
-[D] A distance along n is n·(P₂ − P₁). Its response to either adjustment is that of a point measured there, with the
-gradient n; one adjustment counts by the difference of the responses, control and camera that two have in common by
-their covariance, as in `adjusted`. Such errors change slowly over the ground, normals do not: the (3, 3) covariance of
+[D] A distance along n is n·(P₂ − P₁). What an adjustment does to it is what it does to a point measured there; one
+adjustment counts by the difference of both points, control and camera that two have in common by their covariance, as
+in `adjusted`. Such errors change slowly over the ground, normals do not: the (3, 3) covariance of
 P₂ − P₁ is found at some places and its elements are linear between them, nᵀCn then tells every distance.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.spatial import KDTree
 
 from aerotri.conventions import InputError
+from aerotri.deformation.restitution import Restitution, restitution_of
+from aerotri.rasters.between_places import between_places, spread_places
 from aerotri.results.adjustment import Adjustment
-from aerotri.volume.change.adjusted import in_common, variances_of_difference
+from aerotri.statistics.camera_field import known_field
+from aerotri.statistics.image_sigma import image_sigma_of_cameras
+from aerotri.terrain.adjustment_part import change_covariances, covariances_at, solved_partials
+from aerotri.volume.change.adjusted import in_common
 from aerotri.volume.change.clouds import Cloud, CloudDistances, quadratic
 from aerotri.volume.parts import Measured, Part
 from aerotri.volume.pickets import Pickets, pickets_where_seen
 from aerotri.volume.response import respond
 from aerotri.volume.settings import PER_POINT
+from aerotri.volume.shared import same_adjustment, shared_covariances
 
 PLACES = 6
 """Places along a side at which covariances are found [C]: deformations of a block change over tenths of a model."""
 NAMES = ("the first cloud", "the second cloud")
-PAIRS = ((0, 1), (0, 2), (1, 2))
-DIRECTIONS = np.array([*np.eye(3), *(np.eye(3)[i] + np.eye(3)[j] for i, j in PAIRS)])
-"""Along which variances tell all elements: var(a + b) = var a + var b + 2·cov(a, b)."""
+UP = np.array([0.0, 0.0, 1.0])
+ELEMENTS = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
+"""XX, YY, ZZ, XY, XZ, YZ of a matrix."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +60,7 @@ def adjusted_distances(
     Raises
     ------
     InputError
-        When no photograph of an adjustment sees its cloud.
+        When no two photographs of an adjustment see its cloud from different places.
     """
     rows = _places(found)
     first, second = found.core[rows], found.core[rows] + found.distance[rows, None] * found.normal[rows]
@@ -63,21 +69,40 @@ def adjusted_distances(
     if not seen.any():
         raise InputError("no place of the clouds is seen in both adjustments", "check which result belongs to which")
     # the points of a cloud that its adjustment sees are counted without those that it does not
-    at = [(np.cumsum(own) - 1)[seen] for _, own in epochs]
-    values = np.empty((int(seen.sum()), 3, len(DIRECTIONS)))
-    words = ""
-    for k in range(len(values)):
-        for d, direction in enumerate(DIRECTIONS):
-            one, two = (
-                _part(calibration, pickets.take(np.array([own[k]])), direction)
-                for calibration, (pickets, _), own in zip(calibrations, epochs, at, strict=True)
-            )
-            alone = [part.response.variance + part.response.model for part in (one, two)]
-            values[k, :, d] = sum(variances_of_difference(one, two)), *alone
-            words = words or in_common(one, two, NAMES)
-    covariance = _between(found.core[rows][seen], _elements(values).reshape(len(values), -1), found.core)
+    pickets = [of_epoch.take((np.cumsum(own) - 1)[seen]) for of_epoch, own in epochs]
+    one, two = (
+        _part(calibration, own.take(np.array([0])), UP) for calibration, own in zip(calibrations, pickets, strict=True)
+    )
+    elements = [part[:, *ELEMENTS] for part in _covariances(one, two, pickets)]
+    covariance = between_places(found.core[rows][seen, :2], np.concatenate(elements, axis=1), found.core[:, :2])
+    words = in_common(one, two, NAMES)
     difference, *own = (quadratic(part, found.normal) for part in np.split(covariance, 3, axis=1))
     return AdjustedDistances(np.maximum(difference, 0.0), np.maximum(np.stack(own, axis=1), 0.0), words)
+
+
+def _covariances(one: Part, two: Part, pickets: Sequence[Pickets]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(n, 3, 3) m² of second less first places, and of either, by adjustments; pickets of the n places of either."""
+    calibrations = one.calibration, two.calibration
+    sides = [_side(calibration, own) for calibration, own in zip(calibrations, pickets, strict=True)]
+    first, second = (covariances_at(*side) for side in sides)
+    if same_adjustment(one, two):
+        (calibration, restitution, rows, xyz, seen), (*_, other, seen_there) = sides
+        joint = change_covariances(calibration, restitution, rows, (xyz, other), (seen, seen_there))
+        return joint, first, second
+    solved = [solved_partials(*side) for side in sides]
+    both = shared_covariances(calibrations, (solved[0], solved[1]))
+    return first + second - both - np.swapaxes(both, 1, 2), first, second
+
+
+def _side(
+    calibration: Adjustment, pickets: Pickets
+) -> tuple[Adjustment, Restitution, np.ndarray, np.ndarray, np.ndarray]:
+    """What `covariances_at` asks for."""
+    restitution = replace(restitution_of(calibration), left=known_field(calibration))
+    place = np.repeat(np.arange(len(pickets)), np.diff(pickets.start))
+    seen = np.full((len(pickets), int(np.diff(pickets.start).max())), -1)
+    seen[place, np.arange(len(place)) - pickets.start[place]] = pickets.image
+    return calibration, restitution, np.arange(len(calibration.local.block.images)), pickets.xyz, seen
 
 
 def with_adjustments(found: CloudDistances, clouds: tuple[Cloud, Cloud], adjusted: AdjustedDistances) -> CloudDistances:
@@ -100,10 +125,7 @@ def with_adjustments(found: CloudDistances, clouds: tuple[Cloud, Cloud], adjuste
 def _places(found: CloudDistances) -> np.ndarray:
     """Rows of places with a distance, spread over all of them in plan."""
     rows = np.flatnonzero(np.isfinite(found.distance))
-    plan = found.core[rows, :2]
-    nodes = [np.linspace(low, high, PLACES) for low, high in zip(plan.min(axis=0), plan.max(axis=0), strict=True)]
-    wanted = np.stack(np.meshgrid(*nodes), axis=-1).reshape(-1, 2)
-    return rows[np.unique(KDTree(plan).query(wanted)[1])]
+    return rows[spread_places(found.core[rows, :2], (PLACES, PLACES))]
 
 
 def _measured(xyz: np.ndarray, cloud: Cloud, calibration: Adjustment, name: str) -> tuple[Pickets, np.ndarray]:
@@ -111,9 +133,12 @@ def _measured(xyz: np.ndarray, cloud: Cloud, calibration: Adjustment, name: str)
     per_point: int | np.ndarray = PER_POINT
     if cloud.photographs is not None:
         per_point = cloud.photographs[KDTree(cloud.xyz).query(xyz)[1]].astype(np.int64)
-    pickets, seen = pickets_where_seen(calibration, xyz, 1e-3 * calibration.local.outcome.sigma0_um, per_point)
+    pickets, seen = pickets_where_seen(calibration, xyz, image_sigma_of_cameras(calibration), per_point)
     if not seen.any():
-        raise InputError(f"no photograph of its adjustment sees {name}", "check which result belongs to it")
+        raise InputError(
+            f"no two photographs of its adjustment see {name} from different places",
+            "check which result belongs to it",
+        )
     return pickets, seen
 
 
@@ -122,21 +147,3 @@ def _part(calibration: Adjustment, picket: Pickets, direction: np.ndarray) -> Pa
     gradient = direction[None]
     response = respond(calibration, picket, gradient)
     return Part(calibration, response, None, 1, len(picket.image), 0.0, Measured(picket, gradient))
-
-
-def _elements(values: np.ndarray) -> np.ndarray:
-    """(…, 6) XX, YY, ZZ, XY, XZ, YZ of variances (…, 6) along `DIRECTIONS`."""
-    own = values[..., :3]
-    mixed = [0.5 * (values[..., 3 + k] - own[..., i] - own[..., j]) for k, (i, j) in enumerate(PAIRS)]
-    return np.concatenate([own, np.stack(mixed, axis=-1)], axis=-1)
-
-
-def _between(places: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Values (p, m) at places (p, 3), linear between them in plan, at (k, 3); beyond them those of the nearest."""
-    plan = places[:, :2] - places[:, :2].mean(axis=0)
-    wanted = at[:, :2] - places[:, :2].mean(axis=0)
-    out = np.asarray(NearestNDInterpolator(plan, values)(wanted))
-    if len(plan) > 3 and np.linalg.matrix_rank(plan) == 2:
-        linear = np.asarray(LinearNDInterpolator(plan, values)(wanted))
-        out = np.where(np.isfinite(linear), linear, out)
-    return out

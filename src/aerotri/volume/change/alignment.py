@@ -108,7 +108,7 @@ def align(
     Raises
     ------
     InputError
-        When too few cells are known on stable ground, or their slopes do not tell a shift.
+        When too few cells are known on stable ground, or it is one plane, which determines no shift.
     """
     names = NAMES[how]
     rows, columns = np.nonzero(stable)
@@ -142,9 +142,14 @@ def _robust(a: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     x = np.zeros(a.shape[1])
     for _ in range(ROUNDS):
         if a.shape[1]:
-            values = np.linalg.svd(a[used] / np.linalg.norm(a[used], axis=0), compute_uv=False)
+            size = np.linalg.norm(a[used], axis=0)
+            # of level ground the slopes are 0, and with them the columns of a shift
+            values = np.linalg.svd(a[used] / np.where(size > 0.0, size, 1.0), compute_uv=False)
             if not values[-1] > 1e-6:
-                raise InputError("stable ground does not tell how the surface is shifted", "give --align height")
+                raise InputError(
+                    "the stable ground is level or one plane and does not determine a shift in plan",
+                    "give --align height",
+                )
             x = np.linalg.lstsq(a[used], d[used], rcond=None)[0]
         left = d - a @ x
         centre = np.median(left[used]) if not a.shape[1] else 0.0
