@@ -493,7 +493,7 @@ def test_text_has_no_powers_of_ten(cone, tmp_path):
                             "variants": [{"variant": "free", "value_m3": -26.02, "sigma_m3": 124.0}]}}  # fmt: skip
     text = "\n".join(outcome_lines(content | large | {"sigma": sigma}, tmp_path))
     assert "e+" not in text
-    assert "net 12345700 m³ ± 23460 (1 σ): cut 12345700, fill 0.00402402" in text
+    assert text.startswith("net 12\u2009345\u2009678 ± 23\u2009457 m³ (1 σ): cut 12345678 m³, fill 0 m³; ")
     assert "+887 ± 302 m³" in text
     assert "−26 ± 124 m³" in text
 

@@ -5,17 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import KDTree
 
 from aerotri.rasters.grids import Grid
 from aerotri.rasters.held import HeldRaster
-from aerotri.volume.bases import level, nodes_of, parse_base
+from aerotri.volume.bases import PlaneBase, SurfaceBase, level, nodes_of, parse_base
 from aerotri.volume.between_sides import between_on_side, sigma_at_places
 from aerotri.volume.boundary import boundary_of
 from aerotri.volume.cell_noise import NO_NOISE, CellNoise
 from aerotri.volume.counted import Counted, counted_pieces
+from aerotri.volume.either_side import Lost, lost_on_either_side
 from aerotri.volume.functionals import cell_volume, tin_volume, triangulated
-from aerotri.volume.kinks import lost_on_either_side
 from aerotri.volume.rectified import covariance_above, excess, expected_above, line_of_shared, share_of_variance
 from aerotri.volume.regions import base_over, region_of_cells, region_of_pieces
 from aerotri.volume.roughness import Roughness, ground_of
@@ -24,6 +25,7 @@ from aerotri.volume.triangles import cut_to, prism_sums
 SIZE = 80
 GRID = Grid(SIZE, SIZE, 0.0, float(SIZE), 1.0, 1.0)
 X, Y = np.meshgrid(GRID.x(np.arange(SIZE)), GRID.y(np.arange(SIZE)))
+FINE = Grid(104, 104, -2.0, 102.0, 1.0, 1.0)
 OUTLINE = boundary_of(shapely.box(10.0, 10.0, 70.0, 70.0), "square")
 
 
@@ -124,7 +126,9 @@ def test_ground_between_heights_above_a_level():
         ground = ground_of(roughness, xyz, triangles[pieces.triangle], np.ones(len(pieces.triangle)), 0.0)
         sums = prism_sums(outline.polygon, xyz[triangles][:, :, :2], xyz[triangles][:, :, 2] - height)
         for sign, k in ((1, 0), (-1, 1)):
-            found = between_on_side(ground, Counted(level(height), sign))
+            area = np.bincount(pieces.triangle, pieces.area, len(triangles))
+            lost = lost_on_either_side(xyz, triangles, area, Counted(level(height), sign), 0.0)
+            found = between_on_side(ground, Counted(level(height), sign), lost.ground)
             missed = weight @ np.maximum(sign * (z[inside] - height), 0.0) - sums[k]
             errors.append((missed, found.curvature))
             z2.append((missed - found.curvature) ** 2 / found.variance)
@@ -201,29 +205,80 @@ def _random_tin(heights, seed):
     return xyz, triangles, np.bincount(pieces.triangle, pieces.area, len(triangles))
 
 
-def test_kinks_tell_what_is_lost_at_a_face():
-    """A wall with a level through its middle: straight triangles make a ramp of it, wherever the points lie."""
-    true, lost, told = 3.0 * 40.0 * 80.0, [], []
+def _cut_and_fill(xyz, triangles):
+    return prism_sums(shapely.box(10.0, 10.0, 90.0, 90.0), xyz[triangles][:, :, :2], xyz[triangles][:, :, 2])[:2]
+
+
+@pytest.mark.parametrize("face", [0.0, 2.0])
+def test_what_is_lost_at_a_face_is_told(face):
+    """A wall, and a steep face, with a level through the middle: straight triangles make a ramp of it, wherever the
+    points lie. Heights at the points tell by how much."""
+
+    def heights(x, y, _):
+        return np.clip(6.0 * (x + 3.0 * np.sin(y / 7.0) - 50.0) / max(face, 1e-9), -3.0, 3.0)
+
+    x, y = np.meshgrid(*[np.arange(10.05, 90.0, 0.1)] * 2)
+    true = 0.5 * np.abs(heights(x, y, None)).mean() * 80.0**2
+    lost, told = [], []
     for seed in range(6):
-        xyz, triangles, area = _random_tin(lambda x, y, _: np.where(x + 3.0 * np.sin(y / 7.0) < 50.0, -3.0, 3.0), seed)
-        corners = xyz[triangles]
-        cut, fill = prism_sums(shapely.box(10.0, 10.0, 90.0, 90.0), corners[:, :, :2], corners[:, :, 2])[:2]
-        lost.append(true - 0.5 * (cut + fill))
-        told.append(lost_on_either_side(xyz, triangles, area, Counted(level(0.0), 1), 0.0))
+        xyz, triangles, area = _random_tin(heights, seed)
+        lost.append(true - 0.5 * sum(_cut_and_fill(xyz, triangles)))
+        told.append(lost_on_either_side(xyz, triangles, area, Counted(level(0.0), 1), 0.0).ground)
     assert min(lost) > 0.01 * true
-    assert np.mean(told) == pytest.approx(np.mean(lost), rel=0.2)
+    assert np.mean(told) == pytest.approx(np.mean(lost), rel=0.1)
 
 
-def test_kinks_of_a_plane_and_of_noise_tell_nothing():
-    """A plane through the level has none; those of noise on level ground are taken off, where its σ is told."""
-    xyz, triangles, area = _random_tin(lambda x, y, _: 0.1 * (x - 50.0), 3)
-    assert abs(lost_on_either_side(xyz, triangles, area, Counted(level(0.0), 1), 0.0)) < 1e-8
-    told = np.zeros(2)
+def test_ground_finer_than_the_points_is_told():
+    """Loads as wide as the points stand apart, where bends between neighbours are not those of the ground."""
+
+    def heights(x, y, _):
+        return 3.0 * np.cos(2.0 * np.pi * x / 4.0) * np.cos(2.0 * np.pi * y / 5.0)
+
+    x, y = np.meshgrid(*[np.arange(10.05, 90.0, 0.1)] * 2)
+    true = 0.5 * np.abs(heights(x, y, None)).mean() * 80.0**2
+    lost, told = [], []
     for seed in range(6):
-        xyz, triangles, area = _random_tin(lambda x, y, rng: rng.normal(0.0, 0.1, len(x)), seed)
-        told += [lost_on_either_side(xyz, triangles, area, Counted(level(0.0), 1), noise) for noise in (0.01, 0.0)]
-    assert abs(told[0]) < 0.25 * told[1]
-    assert lost_on_either_side(xyz, triangles, area, Counted(level(0.0), -1), 0.01) == pytest.approx(
-        lost_on_either_side(xyz, triangles, area, Counted(level(0.0), 1), 0.01)
-    )
-    assert lost_on_either_side(xyz, triangles, 0.0 * area, Counted(level(0.0), 1), 0.0) == 0.0
+        xyz, triangles, area = _random_tin(heights, seed)
+        lost.append(true - 0.5 * sum(_cut_and_fill(xyz, triangles)))
+        told.append(lost_on_either_side(xyz, triangles, area, Counted(level(0.0), 1), 0.0).ground)
+    assert np.mean(told) == pytest.approx(np.mean(lost), rel=0.1)
+
+
+def test_a_plane_through_the_base_loses_nothing():
+    xyz, triangles, area = _random_tin(lambda x, y, _: 0.1 * (x - 50.0), 3)
+    slope = PlaneBase("slope", 0.0, 0.1, 0.05, 50.0, 50.0)
+    found = lost_on_either_side(xyz, triangles, area, Counted(slope, 1), 0.0)
+    whole = float(area @ np.abs(xyz[triangles][:, :, 1] - 50.0).mean(axis=1))
+    assert abs(found.ground) < 1e-9 * whole
+    assert found.noise == 0.0
+    assert found.above + found.below == pytest.approx(2.0 * found.above, rel=0.1)
+    # where nothing is below, the fill loses nothing: the cut loses all that the net volume does
+    all_above = lost_on_either_side(xyz, triangles, area, Counted(level(-10.0), 1), 0.0)
+    assert all_above.below == pytest.approx(0.0, abs=1e-9 * all_above.above)
+    assert all_above.at_least(5.0) == pytest.approx(2.5)
+    one_side = lost_on_either_side(xyz, triangles, area, Counted(level(-10.0), 1), 0.0)
+    assert abs(one_side.ground) < 1e-9 * whole
+    assert lost_on_either_side(xyz, triangles, 0.0 * area, Counted(level(0.0), 1), 0.0) == Lost()
+
+
+@pytest.mark.parametrize(("slope", "of_base"), [(0.0, 0.0), (0.0, 0.1), (0.02, 0.0), (0.02, 0.1)])
+def test_noise_is_taken_off_what_is_lost(slope, of_base):
+    """Level ground at the base, and a slope through it, heights of both with noise: nothing is lost between points, and
+    what noise adds is told, that of a measured base too. Noise of both signs, so that its first order cancels."""
+    told, added = [], []
+    x, y = np.meshgrid(*[np.arange(10.25, 90.0, 0.5)] * 2)
+    for seed, sign in ((seed, sign) for seed in range(4) for sign in (1.0, -1.0)):
+        noise = sign * np.random.default_rng(50 + seed).normal(0.0, of_base, (104, 104))
+        base = SurfaceBase("base", HeldRaster(noise, FINE, None, "base"))
+        xyz, triangles, area = _random_tin(
+            lambda x, y, rng, sign=sign: slope * (x - 50.0) + sign * rng.normal(0.0, 0.1, len(x)), seed
+        )
+        counted = Counted(base, 1, noise=of_base**2 * 4.0 / 9.0)
+        found = lost_on_either_side(xyz, triangles, area, counted, 0.01)
+        told.append((found.ground, found.noise))
+        h = LinearNDInterpolator(xyz[:, :2], xyz[:, 2])(x, y) - base.heights(x.ravel(), y.ravel()).reshape(x.shape)
+        added.append(0.5 * (np.abs(h).mean() - np.abs(slope * (x - 50.0)).mean()) * 80.0**2)
+    ground, noise = np.mean(told, axis=0)
+    assert abs(ground) < 0.25 * np.mean(added)
+    # on level ground at the base the scatter of 50 heights is taken for ground in part
+    assert noise == pytest.approx(np.mean(added), rel=0.35 if slope == 0.0 else 0.25)

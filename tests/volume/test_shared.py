@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,8 +19,9 @@ from aerotri.volume.functionals import tin_volume, triangulated
 from aerotri.volume.parts import Measured, Part, part_of_pickets
 from aerotri.volume.pickets import pickets_where_seen
 from aerotri.volume.response import respond
+from aerotri.volume.roughness import Between
 from aerotri.volume.settings import SigmaOptions
-from aerotri.volume.shared import adjustment_key, difference_part, same_adjustment
+from aerotri.volume.shared import adjustment_key, both_between, difference_part, places_apart, same_adjustment
 from places import PROJECT
 
 RUNS = 12
@@ -116,3 +118,26 @@ def test_sigma_of_the_difference_is_its_scatter(proof, noisy):
 def adjusted(proof, seed):
     """Once for both tests."""
     return proof.adjusted_block(seed)
+
+
+def test_ground_of_a_base_is_added_to_a_side_and_taken_off_the_net_volume():
+    upper, lower = Between(3.0, 1.0), Between(2.0, 4.0)
+    assert both_between([(upper, 1.0), (lower, 1.0)], False) == Between(1.0, 5.0)
+    assert both_between([(upper, 1.0), (lower, 1.0)], True) == Between(5.0, 5.0)
+    assert both_between([(upper, 1.0), (None, 1.0)], True) == upper
+    assert both_between([(None, 1.0), (None, 1.0)], False) is None
+
+
+def test_how_far_points_of_a_base_lie_apart():
+    """Nothing at the same places; about one where they lie independently."""
+
+    def points(xy):
+        measured = SimpleNamespace(pickets=SimpleNamespace(xyz=np.column_stack([xy, xy[:, 0]])),
+                                   gradient=np.ones((len(xy), 3)))  # fmt: skip
+        return SimpleNamespace(measured=measured)
+
+    lattice = np.stack(np.meshgrid(np.arange(40.0), np.arange(40.0)), axis=-1).reshape(-1, 2)
+    elsewhere = np.random.default_rng(1).uniform(0.0, 39.0, (2000, 2))
+    assert places_apart(points(lattice), points(lattice)) == 0.0
+    assert places_apart(points(lattice), points(elsewhere)) == pytest.approx(1.0, abs=0.1)
+    assert places_apart(points(lattice), points(lattice + 0.1)) < 0.2

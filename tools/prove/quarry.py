@@ -1,6 +1,6 @@
 """A quarry with three piles, flown twice: from the photographs to the volumes, their certificates, and what changed.
 
-    python tools/prove/quarry.py FOLDER [--out tools/results]
+    python tools/prove/quarry.py FOLDER [--dense] [--out tools/results]
 
 A level floor between heaps of 6 m, and three piles on it. Each epoch has 15 rendered photographs of
 1200 × 900 pixels, 6 cm a pixel, by a lens that bends and a wrong interior orientation, with the GNSS of a drone in
@@ -12,7 +12,8 @@ shift, and for comparison with a shift as well. The truth of a volume is that of
 the same outline; what the floor does under a pile is not in it. What stands on the floor inside the outline is listed
 beside it. The truth of a change is what came and went inside the outline. Also made: certificates of the volumes and
 of the change, English and German.
-With --out quarry.md is written there.
+With --out quarry.md is written there. With --dense volumes and changes are those of the dense surface, and the table
+is quarry_dense.md.
 """
 
 from __future__ import annotations
@@ -119,7 +120,7 @@ def command(*words: object) -> None:
     subprocess.run([sys.executable, "-m", "aerotri.cli", *map(str, words)], check=True)
 
 
-def measured(folder: Path, epoch: int) -> tuple[dict[str, Any], float]:
+def measured(folder: Path, epoch: int, dense: bool) -> tuple[dict[str, Any], float]:
     """volume.json of an epoch from its photographs, and the seconds of `aerotri run`."""
     flight, flown = aerotri.simulate(plan(epoch), seed=epoch), folder / f"flown_{epoch}"
     if not (flown / "gcp_list.txt").is_file():
@@ -133,10 +134,11 @@ def measured(folder: Path, epoch: int) -> tuple[dict[str, Any], float]:
     if not (project / "run.json").is_file():
         command("run", flown / "photographs", "--out", project, "--gcp", flown / "gcp_list.txt", "--control-sigma-m",
                 "0.01,0.01,0.02", *(word for name in check for word in ("--check", name)), "--boundary", piles,
-                "--interval", INTERVAL, "--no-dense", "--project", named)  # fmt: skip
+                "--interval", INTERVAL, *([] if dense else ["--no-dense"]), "--project", named)  # fmt: skip
     seconds = time.perf_counter() - begun
     out = folder / f"volume_{epoch}"
-    command("volume", project / "dtm", "--layer", "dsm", "--boundary", piles, "--adjustment", project / "result",
+    surface = [project / "dsm"] if dense else [project / "dtm", "--layer", "dsm"]
+    command("volume", *surface, "--boundary", piles, "--adjustment", project / "result",
             "--boundary-sigma", "0.05", "--density", DENSITY[0], "--density-sigma", DENSITY[1], "--project", named,
             "--out", out)  # fmt: skip
     return json.loads((out / "volume.json").read_text(encoding="utf-8")), seconds
@@ -224,6 +226,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="to work in")
     parser.add_argument("--out", type=Path)
     parser.add_argument("--keep", action="store_true", help="go on with photographs and runs that are there")
+    parser.add_argument("--dense", action="store_true", help="volumes and changes of the dense surface")
     options = parser.parse_args()
     folder = options.folder
     if not options.keep:
@@ -233,9 +236,10 @@ def main() -> None:
     write_geojson(folder / "stable.geojson", {"stable": stable()})
     truth = {epoch: standing(epoch) for epoch in HEIGHTS}
     heads = "| epoch | pile | true, m³ | computed | error | σ | error/σ | standing, m³ |"
-    lines = ["# A quarry with three piles, from photographs (tools/prove/quarry.py)", "", heads, "|" + "---|" * 8]
+    called = "tools/prove/quarry.py --dense" if options.dense else "tools/prove/quarry.py"
+    lines = [f"# A quarry with three piles, from photographs ({called})", "", heads, "|" + "---|" * 8]
     for epoch in HEIGHTS:
-        content, seconds = measured(folder, epoch)
+        content, seconds = measured(folder, epoch, options.dense)
         print(f"epoch {epoch}: aerotri run took {seconds:.0f} s", flush=True)
         lines += volume_rows(epoch, content, over_outline(epoch), truth[epoch])
     found = [changed(folder, align) for align in ("height", "shift")]
@@ -245,7 +249,8 @@ def main() -> None:
     documents(folder)
     print("\n".join(lines))
     if options.out:
-        (options.out / "quarry.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        name = "quarry_dense.md" if options.dense else "quarry.md"
+        (options.out / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

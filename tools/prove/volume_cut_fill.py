@@ -130,7 +130,8 @@ def sigma_of(
     used = {name: float(np.sqrt(value)) for name, value in parts.items() if name in on}
     if region is not None and sign:
         used[LINE] = float(np.sqrt(region.line.mean_square))
-    return SideSigma(used, between.curvature if between is not None and ALONE in on else 0.0)
+    beyond = between.curvature if between is not None and ALONE in on else 0.0
+    return SideSigma(used, beyond - (region.line.noise if region is not None and sign else 0.0))
 
 
 def row(name: str, error: np.ndarray, sigma: np.ndarray, expected: str) -> str:

@@ -71,6 +71,8 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=DRAWS)
     add_executor(parser)
     arguments = parser.parse_args()
+    if arguments.flights < 2:
+        parser.error("one flight has no scatter: give --flights 2 or more")
     folder = folder_of(arguments.folder, arguments)
     ground, look = SCENES[SCENE]
     spec = SPEC | {"terrain": {"height_m": 50.0} | ground}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -96,34 +97,23 @@ def run_volume(
 def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
     """What the user reads of the volume."""
     from aerotri.deformation.restitution import ORIENTED
-    from aerotri.formats.results.volume import beyond_of_side, boundary_in_words, sigma_of_side
+    from aerotri.formats.results.volume import boundary_in_words, sigma_of_side
     from aerotri.report.quality import with_sigma
 
     c, s = content, content["sigma"]
-    sure = "" if s is None else f" ± {in_digits(s['sigma_m3'], 4)} (1 σ)"
-    of_cut, of_fill = (_sure(sigma_of_side(c, name)) for name in ("cut", "fill"))
+    whole = _Whole.of(c)
+    net = whole.told(c["net_m3"], None if s is None else s["sigma_m3"])
+    cut, fill = (whole.told(c[f"{name}_m3"], sigma_of_side(c, name)) for name in ("cut", "fill"))
     lines = [
-        f"net {in_digits(c['net_m3'], 6)} m³{sure}: cut {in_digits(c['cut_m3'], 6)}{of_cut}, fill "
-        f"{in_digits(c['fill_m3'], 6)}{of_fill}; {c['method']}, over "
-        f"{c['base']['name']}, {in_digits(c['boundary']['area_m2'], 6)} m² inside {boundary_in_words(c['boundary'])}"
+        f"net {net}{'' if s is None else ' (1 σ)'}: cut {cut}, fill {fill}; {c['method']}, over {c['base']['name']}, "
+        f"{in_digits(c['boundary']['area_m2'], 6)} m² inside {boundary_in_words(c['boundary'])}"
     ]
-    lines += [_pile_line(pile) for pile in c["piles"]]
+    lines += [_pile_line(pile, whole) for pile in c["piles"]]
     if c["mass"] is not None:
         lines.append(f"mass: {_tonnes(c['mass'])} at {c['mass']['density_t_per_m3']:g} t/m³")
     if s is not None:
         lines.append("σ by part, m³: " + ", ".join(f"{name} {in_digits(v, 4)}" for name, v in s["parts_m3"].items()))
-        beyond = [beyond_of_side(c, name) for name in ("cut", "fill")]
-        if beyond[0] is not None and beyond[1] is not None:
-            lines.append(
-                f"ground expected beyond straight lines between heights: cut {in_digits(beyond[0], 4)} m³, fill "
-                f"{in_digits(beyond[1], 4)} m³, not in the volume, counted in σ"
-            )
-        if s["curvature"] is not None:
-            beyond = with_sigma(s["curvature"]["value_m3"], s["curvature"]["sigma_m3"], signed=True)
-            lines.append(
-                f"ground expected beyond straight lines between heights: {beyond} m³, not in the volume, counted in σ "
-                "as interpolation"
-            )
+        lines += _beyond(c, whole)
         where = "in the volume:" if s["systematic"]["in_the_volume"] else "corrected; uncorrected they would add"
         for one in s["systematic"]["variants"]:
             added = with_sigma(one["value_m3"], one["sigma_m3"], signed=True)
@@ -132,22 +122,57 @@ def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
     return [*lines, *(f"note: {text}" for text in c["warnings"]), f"Written to {target}"]
 
 
-def _pile_line(pile: dict[str, Any]) -> str:
-    sure = _sure(pile["sigma_m3"])
+@dataclass(frozen=True)
+class _Whole:
+    """How volumes without σ are told: all with the decimals of the largest, to six digits, a litre at least."""
+
+    decimals: int
+
+    @classmethod
+    def of(cls, content: dict[str, Any]) -> _Whole:
+        largest = max(abs(content[f"{name}_m3"]) for name in ("net", "cut", "fill"))
+        digits = 5 if largest <= 0.0 else 5 - floor(log10(largest))
+        return cls(min(max(digits, 0), 3))
+
+    def told(self, value: float, sigma: float | None) -> str:
+        """m³, to two digits of σ where there is one."""
+        from aerotri.report.quality import with_sigma
+
+        plain = f"{value:.{self.decimals}f}".replace("-", "−")
+        return f"{plain} m³" if sigma is None else f"{with_sigma(value, sigma)} m³"
+
+
+def _beyond(content: dict[str, Any], whole: _Whole) -> list[str]:
+    """What straight lines between the heights leave out."""
+    from aerotri.formats.results.volume import beyond_of_side
+    from aerotri.report.quality import with_sigma
+
+    held = [(name, beyond_of_side(content, name)) for name in ("cut", "fill")]
+    told = [f"{name} {whole.told(value, None)}" for name, value in held if value is not None]
+    bent = content["sigma"]["curvature"]
+    if bent is not None:
+        told.append(f"net {with_sigma(bent['value_m3'], bent['sigma_m3'], signed=True)} m³")
+    if not told:
+        return []
+    return [
+        f"ground that straight lines between the heights are expected to leave out: {', '.join(told)}; not in the "
+        "volume, counted in σ"
+    ]
+
+
+def _pile_line(pile: dict[str, Any], whole: _Whole) -> str:
     mass = "" if pile["mass"] is None else f", {_tonnes(pile['mass'])}"
+    cut, fill = (whole.told(pile[f"{name}_m3"], pile.get(f"sigma_{name}_m3")) for name in ("cut", "fill"))
     return (
-        f"  {pile['name']}: net {in_digits(pile['net_m3'], 6)} m³{sure}, cut {in_digits(pile['cut_m3'], 6)}"
-        f"{_sure(pile.get('sigma_cut_m3'))}, fill {in_digits(pile['fill_m3'], 6)}{_sure(pile.get('sigma_fill_m3'))}, "
+        f"  {pile['name']}: net {whole.told(pile['net_m3'], pile['sigma_m3'])}, cut {cut}, fill {fill}, "
         f"on {in_digits(pile['area_m2'], 6)} m²{mass}"
     )
 
 
-def _sure(sigma: float | None) -> str:
-    return "" if sigma is None else f" ± {in_digits(sigma, 4)}"
-
-
 def _tonnes(mass: dict[str, Any]) -> str:
-    sure = "" if mass["sigma_t"] is None else f" ± {in_digits(mass['sigma_t'], 4)}"
+    from aerotri.report.quality import with_sigma
+
     stated = mass["stated_sigma_t"]
     alone = "" if stated is None else f" (± {in_digits(stated, 4)} t by what is stated alone)"
-    return f"{in_digits(mass['net_t'], 6)}{sure} t{alone}"
+    sure = in_digits(mass["net_t"], 6) if mass["sigma_t"] is None else with_sigma(mass["net_t"], mass["sigma_t"])
+    return f"{sure} t{alone}"

@@ -185,13 +185,19 @@ class SigmaOfVolumes:
         of_lower = None if counted is None else self._counted_below(counted, base)
         return part, surface_part(lower, boundary, None, options, noise[1], of_lower)
 
-    def _counted_below(self, counted: Counted, base: SurfaceBase) -> Counted:
-        """What counts, of the surface that is the base."""
+    def _counted_below(self, counted: Counted, base: SurfaceBase, net: PileSigma | None = None) -> Counted:
+        """What counts, of the surface that is the base; net : of both, where a side counts."""
         from aerotri.volume.bases import SurfaceBase
         from aerotri.volume.counted import Counted
+        from aerotri.volume.shared import places_apart
 
         known = None if self.below is None or self.below.points is None else base.surface
-        return Counted(SurfaceBase(self.reader.path.name, self.reader), -counted.sign, counted.spread, known)
+        upper = SurfaceBase(self.reader.path.name, self.reader)
+        found = Counted(upper, -counted.sign, counted.spread, known)
+        if net is None or net.base_part is None:
+            return found
+        apart = places_apart(net.part, net.base_part)
+        return replace(found, noise=net.part.noise_at(apart), apart=apart)
 
     def _net(self, base: Base, boundary: Boundary, volume: Volume) -> PileSigma:
         """Of all that is known inside a boundary."""
@@ -208,9 +214,12 @@ class SigmaOfVolumes:
     def _side(self, net: PileSigma, base: Base, boundary: Boundary, of: tuple[int, float]) -> PileSigma:
         """Of the cut (1) or the fill (−1), with σ of the height along the line between them."""
         from aerotri.volume.counted import Counted
+        from aerotri.volume.shared import places_apart
 
         sign, spread = of
-        return self._counting(net, Counted(base, sign, spread, self._known_of(net)), boundary)
+        other = net.base_part
+        noise = 0.0 if other is None else other.noise_at(places_apart(net.part, other))
+        return self._counting(net, Counted(base, sign, spread, self._known_of(net), noise=noise), boundary)
 
     def _spread(self, net: PileSigma, base: Base, boundary: Boundary) -> float:
         """m, σ of the height over the base along the line between cut and fill, the same error all along it."""
@@ -236,7 +245,7 @@ class SigmaOfVolumes:
             raise ValueError("what counts of a part was asked for already")
         part, other = net.part.side(counted), None
         if net.base_part is not None and net.base_part.side is not None and isinstance(base, SurfaceBase):
-            other = net.base_part.side(self._counted_below(counted, base))
+            other = net.base_part.side(self._counted_below(counted, base, net))
         region = part.region
         area = 0.0 if region is None else region.area
         return PileSigma(part, other, area, volume_sigma(self.reader, base, boundary, part, other, self.options))

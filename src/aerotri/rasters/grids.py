@@ -6,7 +6,6 @@ NaN inside the program and the no-data value in a file.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.rasters.quiet import quietly
 from aerotri.vectors.geojson import LARGEST_M
 
 if TYPE_CHECKING:
@@ -392,13 +392,3 @@ def _told(path: Path, what: str, remedy: str) -> Generator[None]:
     except (RasterioError, CPLE_BaseError, OSError, ValueError, MemoryError, SystemError) as error:
         short = (str(error.__cause__ or error).splitlines() or [""])[0][:200] or type(error).__name__
         raise InputError(f"{what}: {short}", remedy, path) from error
-
-
-@contextmanager
-def quietly() -> Generator[None]:
-    """Without a warning for rasters of local blocks, which have no CRS, and for those that are refused anyway."""
-    from rasterio.errors import NotGeoreferencedWarning
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NotGeoreferencedWarning)
-        yield

@@ -6,7 +6,6 @@ error that names it: nothing is filled in.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,12 +16,13 @@ import numpy as np
 import rasterio
 from rasterio._err import CPLE_BaseError
 from rasterio.enums import ColorInterp, MaskFlags, Resampling
-from rasterio.errors import NotGeoreferencedWarning, RasterioError
+from rasterio.errors import RasterioError
 from rasterio.transform import Affine
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.rasters.grids import window_of
 from aerotri.rasters.photograph_settings import COMPRESSION
+from aerotri.rasters.quiet import quietly
 from aerotri.rasters.room import raise_full_disk
 
 DRIVERS = {b"II*\0": "GTiff", b"MM\0*": "GTiff", b"II+\0": "GTiff", b"MM\0+": "GTiff", b"\xff\xd8\xff": "JPEG"}
@@ -176,8 +176,7 @@ def _bits(path: Path, dataset: Any) -> int:
 def _told(path: Path) -> Generator[None]:
     """Errors of rasterio as `InputError`s that name the file."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        with quietly():
             yield
     except (RasterioError, CPLE_BaseError, OSError, ValueError, UnicodeError, MemoryError, SystemError) as error:
         cause = error.__cause__ or error
@@ -229,8 +228,7 @@ def create_image(
     )
     settings: dict[str, Any] = {"bigtiff": "if_safer", "num_threads": "all_cpus", **tiling, **options}
     try:
-        with warnings.catch_warnings(), rasterio.Env(**SETTINGS):
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        with quietly(), rasterio.Env(**SETTINGS):
             with rasterio.open(
                 path, "w", driver="GTiff", width=columns, height=rows, count=bands, dtype=dtype, **settings
             ) as dataset:
@@ -297,8 +295,7 @@ def _compression(photograph: Photograph, wanted: str) -> dict[str, Any]:
 
 
 def _georeference(source: Any) -> dict[str, Any]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+    with quietly():
         points, crs_of_points = source.gcps
         options: dict[str, Any] = {"crs": source.crs} if source.crs else {}
         if source.transform != Affine.identity():

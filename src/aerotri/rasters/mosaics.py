@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.rasters.grids import CACHE_BYTES, TILE, Grid, window_of
+from aerotri.rasters.quiet import quietly
 from aerotri.rasters.room import raise_full_disk
 
 OPAQUE = {"uint8": 255, "uint16": 65535}
@@ -55,7 +55,7 @@ def write_mosaic(
     import rasterio
     import rasterio.shutil
     from rasterio import Affine
-    from rasterio.errors import NotGeoreferencedWarning, RasterioError
+    from rasterio.errors import RasterioError
 
     plain = path.with_name(f"{path.name}.plain")
     transform = Affine(grid.cell_x, 0.0, grid.left, 0.0, -grid.cell_y, grid.top)
@@ -65,8 +65,7 @@ def write_mosaic(
     cloud = {"compress": "DEFLATE", "level": LEVEL, "predictor": "YES", "bigtiff": "IF_SAFER",
              "num_threads": "ALL_CPUS", "overview_resampling": "AVERAGE" if average else "NEAREST"}  # fmt: skip
     try:
-        with warnings.catch_warnings(), rasterio.Env(GDAL_CACHEMAX=cache):
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        with quietly(), rasterio.Env(GDAL_CACHEMAX=cache):
             with rasterio.open(
                 plain, "w", driver="GTiff", height=grid.rows, width=grid.columns, count=len(bands), dtype=dtype,
                 crs=crs, transform=transform, nodata=None if average else NUMBERS_NO_DATA, **made,
@@ -105,16 +104,13 @@ def read_mosaic(path: Path, window: tuple[int, int, int, int] | None = None, lon
     longest : cells of the longer side at most, from the overviews; 0: all.
     """
     import rasterio
-    from rasterio.errors import NotGeoreferencedWarning
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NotGeoreferencedWarning)
-        with rasterio.open(path) as file:
-            if window is not None:
-                row, column, rows, columns = window
-                return file.read(window=window_of(column, row, columns, rows), boundless=True, fill_value=0)
-            less = max(1.0, max(file.height, file.width) / longest) if longest else 1.0
-            return file.read(out_shape=(file.count, max(int(file.height / less), 1), max(int(file.width / less), 1)))
+    with quietly(), rasterio.open(path) as file:
+        if window is not None:
+            row, column, rows, columns = window
+            return file.read(window=window_of(column, row, columns, rows), boundless=True, fill_value=0)
+        less = max(1.0, max(file.height, file.width) / longest) if longest else 1.0
+        return file.read(out_shape=(file.count, max(int(file.height / less), 1), max(int(file.width / less), 1)))
 
 
 def read_heights(path: Path, longest: int) -> np.ndarray:
@@ -141,13 +137,11 @@ def bounds_of(path: Path) -> tuple[float, float, float, float]:
         When it is no raster, or no north-up one.
     """
     import rasterio
-    from rasterio.errors import NotGeoreferencedWarning, RasterioError
+    from rasterio.errors import RasterioError
 
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            with rasterio.open(path) as file:
-                t, bounds = file.transform, file.bounds
+        with quietly(), rasterio.open(path) as file:
+            t, bounds = file.transform, file.bounds
     except (RasterioError, OSError) as error:
         raise InputError(f"cannot be read: {error}", "give a GeoTIFF", path) from None
     if t.is_identity or t.b or t.d or t.a <= 0.0 or t.e >= 0.0:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import FilePath
-from aerotri.rasters.grids import NO_DATA, SIGMA, TILE, Grid, quietly, transform_of, window_of
+from aerotri.rasters.grids import NO_DATA, SIGMA, TILE, Grid, transform_of, window_of
+from aerotri.rasters.quiet import quietly
 from aerotri.rasters.room import raise_full_disk
 
 

@@ -24,7 +24,9 @@ PART_WORDS = {
     "alignment": "Alignment on stable ground.",
     "adjustment": "What the adjustments add: by their equations where both are given; else to all cells alike, 0 with "
     "an alignment or one adjustment.",
-    "model": "Its model part, where groups of photographs share errors; 0 where the adjustments are not given.",
+    "model": "What image errors add that noise does not explain: errors that photographs of one strip, or of another "
+    "group, have in common, and errors of the camera that the additional parameters leave. 0 where the residuals show "
+    "none, or where the adjustments are not given.",
     "matching_shared": "Matching errors that neighbouring cells of dense surfaces share and that do not average out; 0 "
     "of other surfaces.",
 }

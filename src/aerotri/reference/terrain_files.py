@@ -218,8 +218,9 @@ def _parts(of: str) -> list[Item]:
         Item(
             f"{of}.{MODEL}",
             "number",
-            "Part of errors that strips or other groups of photographs share. Only where the adjustment has a model "
-            "part.",
+            "Part of image errors that noise does not explain: errors that photographs of one strip, or of another "
+            "group, have in common, and errors of the camera that the additional parameters leave. Only where the "
+            "residuals of the adjustment show such errors.",
             "m³",
             optional=True,
         ),

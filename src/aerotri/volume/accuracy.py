@@ -15,9 +15,10 @@ from aerotri.volume.parts import Part
 from aerotri.volume.rectified import LINE, NO_LINE, Line
 from aerotri.volume.regions import Region
 from aerotri.volume.response import Systematic, systematic
-from aerotri.volume.roughness import Between, roughness_of_cells
+from aerotri.volume.roughness import roughness_of_cells
 from aerotri.volume.settings import SigmaOptions
 from aerotri.volume.shared import (
+    both_between,
     difference_part,
     same_adjustment,
     shared_camera_covariance,
@@ -208,14 +209,15 @@ def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: Sig
     """All parts together."""
     both, shared, said = [part] if base_part is None else [part, base_part], 0.0, []
     lasting = sum(one.lasting_variance for one in both)
+    of_side = beside.line is not None
     if base_part is not None and same_adjustment(part, base_part):
-        joint, once = difference_part(part, base_part, options.corrected)
+        joint, once = difference_part(part, base_part, options.corrected, of_side)
         both, said, lasting = [joint], [_one_adjustment(once)], lasting * (1.0 - once)
     elif base_part is not None:
         shared = shared_control_covariance(part, base_part) + shared_camera_covariance(part, base_part)
         said = [shared_in_words(part, base_part)]
     adjustment = sum(one.response.variance for one in both) - 2.0 * shared
-    between = _difference([one.between for one in both])
+    between = both_between([(one.between, 1.0) for one in both], of_side)
     parts = {
         "adjustment": np.sqrt(max(adjustment, 0.0)),
         "matching": np.sqrt(sum(one.response.noise for one in both)),
@@ -289,14 +291,6 @@ def boundary_variance(surface: Surface, base: Base, boundary: Boundary, sigma: f
         by_corner = from_start[:, None] * normal + np.roll(from_end[:, None] * normal, 1, axis=0)
         total += float(np.sum(by_corner**2))
     return sigma**2 * total
-
-
-def _difference(between: list[Between | None]) -> Between | None:
-    """Of the surface less that of the base."""
-    known = [(sign, one) for sign, one in zip((1.0, -1.0), between, strict=False) if one is not None]
-    if not known:
-        return None
-    return Between(sum(sign * one.curvature for sign, one in known), sum(one.variance for _, one in known))
 
 
 def base_variance(

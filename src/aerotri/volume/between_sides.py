@@ -1,37 +1,41 @@
 """The ground between heights, above or below a base: what straight lines leave out of a cut or a fill.
 
-[D] Given the heights, the ground at a place is normal with mean and variance of kriging. Where the base runs through
-the ground between them, the cut holds E max(h, 0) there, which is more than that of the mean: straight lines make both
-cut and fill too small.
+[D] Half of what they leave out of the net volume, with its sign, and what both lose alike (see `either_side`). Given
+the heights, the ground at a place is normal with mean and variance of kriging, and what is above the base scatters as
+that does.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from aerotri.volume.counted import PLACES, Counted, near_the_line
-from aerotri.volume.rectified import covariance_above, expected_above
+from aerotri.volume.either_side import WITHIN
+from aerotri.volume.rectified import covariance_above
 from aerotri.volume.roughness import AROUND, CHUNK, Between, Ground, Roughness, terms_of_second_order
 
 
-def between_on_side(ground: Ground, counted: Counted) -> Between:
+def between_on_side(ground: Ground, counted: Counted, lost: float) -> Between:
     """What straight triangles leave out above the base, or below it.
 
-    Triangles that lie on one side of the base as a whole count as in the net volume, or not at all.
+    Triangles that lie on one side of the base as a whole scatter as in the net volume, or not at all.
+
+    Parameters
+    ----------
+    lost : m³, by which straight triangles make the cut and the fill too small alike.
     """
     corners = ground.xyz[ground.triangles]
     scale = np.sqrt(2.0 * ground.area) ** ground.roughness.exponent * ground.roughness.s
     near = near_the_line(counted, corners, np.hypot(scale, np.sqrt(ground.noise)))
     side = counted.sign * counted.at(np.full((len(corners), 1, 3), 1.0 / 3.0), corners)[:, 0] > 0.0
-    more, part = counted.sign * ground.more * side, side.astype(float)
-    own = np.flatnonzero(near)
+    part, own, tree = side.astype(float), np.flatnonzero(near), KDTree(ground.xyz[:, :2])
     for few in (own[k : k + CHUNK] for k in range(0, len(own), CHUNK)):
-        beyond, part[few] = _kriged(ground, KDTree(ground.xyz[:, :2]), few, counted)
-        more[few] = ground.area[few] * beyond
-    return ground.between(more, ground.variance * part)
+        part[few] = _share_above(ground, tree, few, counted)
+    found = ground.between(0.5 * counted.sign * ground.more, ground.variance * part)
+    return replace(found, curvature=found.curvature + lost)
 
 
 def sigma_at_places(ground: Ground) -> float:
@@ -39,6 +43,18 @@ def sigma_at_places(ground: Ground) -> float:
     corners = ground.xyz[ground.triangles[ground.share > 0.0][:CHUNK]]
     covariance = _at_places(ground, KDTree(ground.xyz[:, :2]), corners).covariance
     return float(np.sqrt(max(np.einsum("tqq->tq", covariance).mean(), 0.0)))
+
+
+def sigma_of_straight_lines(ground: Ground) -> float:
+    """m, root of the mean square by which straight lines between heights without noise are off the ground at a place.
+
+    [D] By kriging, in the mean of the ground and beside it; what it finds because of noise is taken off.
+    """
+    corners = ground.xyz[ground.triangles[ground.share > 0.0][:CHUNK]]
+    found = _at_places(ground, KDTree(ground.xyz[:, :2]), corners)
+    bent = found.mean - np.einsum("qk,nk->nq", PLACES, corners[:, :, 2])
+    square = np.mean(np.einsum("tqq->tq", found.covariance) + np.square(bent))
+    return float(np.sqrt(max(square - WITHIN * ground.noise, 0.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,21 +65,17 @@ class _Places:
     covariance: np.ndarray
 
 
-def _kriged(ground: Ground, tree: KDTree, few: np.ndarray, counted: Counted) -> tuple[np.ndarray, np.ndarray]:
-    """(t,) m, mean over triangles of what the ground on a side holds beyond the straight triangle; and the variance of
-    the mean of that ground over that of the mean of all ground."""
+def _share_above(ground: Ground, tree: KDTree, few: np.ndarray, counted: Counted) -> np.ndarray:
+    """(t,) variance of the mean over triangles of the ground on a side, over that of the mean of all ground."""
     corners = ground.xyz[ground.triangles[few]]
     found = _at_places(ground, tree, corners)
     straight = counted.at(np.broadcast_to(PLACES, (len(few), *PLACES.shape)), corners)
     places = np.einsum("qk,nkc->nqc", PLACES, corners)
-    sign = counted.sign
-    above = sign * (straight + found.mean - places[:, :, 2])
+    above = counted.sign * (straight + found.mean - places[:, :, 2])
     sigma = np.sqrt(np.maximum(np.einsum("tqq->tq", found.covariance), 0.0))
     t = np.clip(above / np.maximum(sigma, 1e-300), -40.0, 40.0)
     whole = np.maximum(found.covariance.mean(axis=(1, 2)), 1e-300)
-    part = covariance_above(t, sigma, found.covariance).mean(axis=(1, 2)) / whole
-    beyond = expected_above(above, sigma) - np.maximum(sign * straight, 0.0)
-    return beyond.mean(axis=1), np.clip(part, 0.0, 1.0)
+    return np.clip(covariance_above(t, sigma, found.covariance).mean(axis=(1, 2)) / whole, 0.0, 1.0)
 
 
 def _at_places(ground: Ground, tree: KDTree, corners: np.ndarray) -> _Places:

@@ -27,6 +27,8 @@ class Counted:
     spread : m, σ of the height over it that all places have in common.
     known : where it has no height, nothing counts; None: known everywhere.
     band : m, beside the line: places within it count alone, by exp(−½·(h/band)²); 0: all.
+    noise : m², variance of a height of the other at a place that is its own alone.
+    apart : 0 … 1, how far points lie from those of the other; see `shared.places_apart`.
     """
 
     other: Base
@@ -34,6 +36,8 @@ class Counted:
     spread: float = 0.0
     known: Surface | None = None
     band: float = 0.0
+    noise: float = 0.0
+    apart: float = 1.0
 
     def on_side(self, sign: int, spread: float) -> Counted:
         """What of it lies on one side."""

@@ -13,12 +13,12 @@ from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.image_sigma import image_sigma_of_cameras
 from aerotri.volume.bases import Base, Surface
-from aerotri.volume.between_sides import between_on_side, sigma_at_places
+from aerotri.volume.between_sides import between_on_side, sigma_at_places, sigma_of_straight_lines
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.cell_noise import NO_NOISE, CellNoise, cells_sharing, photographs_at, shares_of_noise
 from aerotri.volume.counted import Counted, counted_pieces
+from aerotri.volume.either_side import WITHIN, lost_on_either_side
 from aerotri.volume.functionals import Functional, cell_volume, tin_volume, triangulated
-from aerotri.volume.kinks import lost_on_either_side
 from aerotri.volume.lasting import NO_LASTING, Lasting, lasting_variance
 from aerotri.volume.pickets import (
     MeasuredPickets,
@@ -27,6 +27,7 @@ from aerotri.volume.pickets import (
     pickets_where_seen,
     with_height_sigmas,
 )
+from aerotri.volume.rectified import Line
 from aerotri.volume.regions import Region, base_over, region_of_cells, region_of_pieces
 from aerotri.volume.response import Response, respond
 from aerotri.volume.roughness import (
@@ -70,6 +71,8 @@ class Part:
     measured : what the surface was measured from; None where nobody asks for it.
     lasting : errors of its heights that do not average out.
     region : what of the boundary counts; None where all does.
+    own_noise : m², variance of a height at a place that is its own alone.
+    ground_sigma : gives by how much straight lines between heights are off the ground at a place, m; None: not known.
     side : gives the share of what of it counts: of a cut or a fill alone.
     """
 
@@ -83,6 +86,13 @@ class Part:
     lasting: Lasting = NO_LASTING
     region: Region | None = None
     side: Callable[[Counted], Part] | None = None
+    own_noise: float = 0.0
+    ground_sigma: Callable[[], float] | None = None
+
+    def noise_at(self, apart: float) -> float:
+        """m², variance of the straight lines at a place; apart : as of `Counted`."""
+        ground = 0.0 if self.ground_sigma is None else self.ground_sigma()
+        return self.own_noise + apart * ground**2
 
     @property
     def lasting_variance(self) -> float:
@@ -131,8 +141,20 @@ def part_of_cells(
     measured = Measured(pickets, functional.gradient[seen])
     lasting = noise.lasting if options.matching_sigma_um is None else NO_LASTING
     side = partial(part_of_cells, calibration, surface, boundary, base, options, noise)
+    own_noise = response.noise / (sharing * _squares(measured.gradient))
     return Part(
-        calibration, response, between, len(pickets), len(pickets.image), unseen, measured, lasting, region, side
+        calibration,
+        response,
+        between,
+        len(pickets),
+        len(pickets.image),
+        unseen,
+        measured,
+        lasting,
+        region,
+        side,
+        own_noise,
+        lambda: within,
     )
 
 
@@ -144,7 +166,7 @@ def part_of_pickets(
     all_pieces = cut_to(boundary.polygon, pickets.xyz[triangles][:, :, :2])
     tin = _Tin(calibration, pickets, triangles, boundary, base, options, all_pieces)
     region, functional, response = _counted_in(tin, counted)
-    noise = _height_noise(response, functional)
+    noise = response.noise / _squares(functional.gradient)
     pieces = counted_pieces(pickets.xyz, triangles, all_pieces, counted)
     share = pieces.area / np.maximum(areas(pickets.xyz[triangles[pieces.triangle]][:, :, :2]), 1e-300)
     used = triangles[pieces.triangle]
@@ -157,7 +179,10 @@ def part_of_pickets(
     unseen = unseen if unseen > ROUNDING * boundary.area else 0.0
     measured, side = Measured(pickets, functional.gradient), partial(_side_of_pickets, tin, ground)
     rays = len(pickets.image)
-    return Part(calibration, response, between, len(pickets), rays, unseen, measured, region=region, side=side)
+    return Part(
+        calibration, response, between, len(pickets), rays, unseen, measured, region=region, side=side,
+        own_noise=WITHIN * noise, ground_sigma=None if ground is None else partial(sigma_of_straight_lines, ground),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,20 +213,21 @@ def _counted_in(tin: _Tin, counted: Counted | None) -> tuple[Region | None, Func
 def _side_of_pickets(tin: _Tin, ground: Ground | None, counted: Counted) -> Part:
     """The share of a cut or a fill."""
     region, functional, response = _counted_in(tin, counted)
-    between = None if ground is None or not counted.sign else _between_on_side(tin, ground, counted)
+    between = None
+    if ground is not None and region is not None and counted.sign:
+        between, noise = _between_on_side(tin, ground, counted)
+        region = replace(region, line=region.line + Line(noise=noise))
     pickets, measured = tin.pickets, Measured(tin.pickets, functional.gradient)
     rays = len(pickets.image)
     return Part(tin.calibration, response, between, len(pickets), rays, 0.0, measured, region=region)
 
 
-def _between_on_side(tin: _Tin, ground: Ground, counted: Counted) -> Between:
-    """What straight triangles leave out of a cut or a fill: by the random function, or by kinks where they say more."""
-    found = between_on_side(ground, counted)
-    net = ground.between(ground.more, ground.variance).curvature
-    alike = found.curvature - 0.5 * counted.sign * net
+def _between_on_side(tin: _Tin, ground: Ground, counted: Counted) -> tuple[Between, float]:
+    """What straight triangles leave out of a cut or a fill, and m³ that noise adds to it."""
     area = np.bincount(tin.pieces.triangle, tin.pieces.area, len(tin.triangles))
-    kinks = lost_on_either_side(tin.pickets.xyz, tin.triangles, area, counted, ground.noise)
-    return replace(found, curvature=found.curvature + max(kinks - alike, 0.0))
+    lost = lost_on_either_side(tin.pickets.xyz, tin.triangles, area, counted, ground.noise)
+    net = ground.between(ground.more, ground.variance).curvature
+    return between_on_side(ground, counted, counted.apart * lost.at_least(net)), lost.noise
 
 
 def part_of_measured(
@@ -229,9 +255,9 @@ def matching_sigma_mm(calibration: Adjustment, options: SigmaOptions) -> float |
     return image_sigma_of_cameras(calibration) if stated is None else 1e-3 * stated
 
 
-def _height_noise(response: Response, functional: Functional) -> float:
-    """m², mean variance of a height that is its own alone: the noise of the volume over the weights' squares."""
-    return response.noise / max(float(np.sum(functional.gradient[:, 2] ** 2)), 1e-300)
+def _squares(gradient: np.ndarray) -> float:
+    """m⁴, of the weights of heights: the noise of a volume over them is the mean variance of a height."""
+    return max(float(np.sum(gradient[:, 2] ** 2)), 1e-300)
 
 
 @dataclass(frozen=True)

@@ -88,6 +88,7 @@ def region_of_cells(surface: Surface, boundary: Boundary, counted: Counted, nois
         d = counted.heights_of_cells(surface.read(row, column, rows, columns).astype(float), grid)
         area = boundary.coverage(grid) * cell * np.isfinite(d)
         sigma = None if noise.sigma is None else noise.sigma.read(row, column, rows, columns).astype(float)
+        sigma = None if sigma is None else np.sqrt(sigma**2 + counted.noise)
         weight = area * counted.share(d, counted.spread_of_cells(sigma))
         lattice.add(*_placed(grid, weight))
         if counted.sign:

@@ -12,6 +12,7 @@ import hashlib
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import ConvexHull, KDTree
 
 from aerotri.adjustment import rigging
 from aerotri.adjustment.scanning import READOUT
@@ -44,18 +45,19 @@ def same_adjustment(first: Part, second: Part) -> bool:
     return one is other or adjustment_key(one) == adjustment_key(other)
 
 
-def difference_part(surface: Part, base: Part, corrected: bool) -> tuple[Part, float]:
+def difference_part(surface: Part, base: Part, corrected: bool, of_side: bool = False) -> tuple[Part, float]:
     """The share of the difference of two surfaces of one adjustment, and which part of it was measured once, 0 … 1.
 
     Parameters
     ----------
-    base : responses to its own volume, counted positive. corrected : as of `respond`.
+    base : responses to its own volume, counted positive. corrected : as of `respond`. of_side : of a cut or a fill.
     """
     if surface.measured is None or base.measured is None:
         raise ValueError("the pickets of both surfaces are needed")
     joint, common = _joined(surface.measured, base.measured)
     response = respond(surface.calibration, joint.pickets, joint.gradient, corrected)
-    between = _difference_between(surface.between, base.between, common)
+    # where both have the same heights, nothing lies between them
+    between = both_between([(surface.between, 1.0 - common[0]), (base.between, 1.0 - common[1])], of_side)
     rays = len(joint.pickets.image)
     part = Part(surface.calibration, response, between, len(joint.pickets), rays, surface.unseen + base.unseen, joint)
     return part, float(min(common))
@@ -136,15 +138,40 @@ def _keys(pickets: Pickets) -> np.ndarray:
     return np.column_stack([place, count, *sums])
 
 
-def _difference_between(one: Between | None, other: Between | None, common: tuple[float, float]) -> Between | None:
-    """Of the surface less that of the base; where both have the same heights, nothing lies between them."""
-    sides = zip((1.0, -1.0), (one, other), common, strict=True)
-    known = [(sign, between, 1.0 - share) for sign, between, share in sides if between is not None]
-    if not known:
+def places_apart(surface: Part, base: Part) -> float:
+    """How far the points of a base lie from those of the surface, 0 … 1: 0 at the same places, 1 independent of them.
+
+    Straight triangles of the base lose of a cut and a fill beside what those of the surface lose. Between points at the
+    same places both have the same triangles, and what they lose together the heights of the surface over the base tell
+    already. [C] Between linearly in the mean square of the distance to the next point of the surface, whose mean is a/6
+    for places at random among squares of area a.
+    """
+    if surface.measured is None or base.measured is None:
+        return 1.0
+    xy, own = surface.measured.pickets.xyz[:, :2], base.measured.gradient[:, 2] != 0.0
+    if len(xy) < 3 or not own.any():
+        return 1.0
+    area = float(ConvexHull(xy - xy.mean(axis=0)).volume) / len(xy)
+    distance = KDTree(xy).query(base.measured.pickets.xyz[own, :2])[0]
+    return float(min(np.mean(np.minimum(np.square(distance), 0.5 * area)) / (area / 6.0), 1.0))
+
+
+def both_between(parts: Sequence[tuple[Between | None, float]], of_side: bool) -> Between | None:
+    """The ground between the heights of a surface, and of its base where that is measured too.
+
+    Parameters
+    ----------
+    parts : of the surface and of the base, and which share of each counts.
+    of_side : of a cut or a fill: either is told as what that volume holds beyond the straight lines. Else the base's is
+        what lies under the base.
+    """
+    known = [(1.0 if of_side or not k else -1.0, *part) for k, part in enumerate(parts)]
+    found = [(sign, between, share) for sign, between, share in known if between is not None]
+    if not found:
         return None
     return Between(
-        sum(sign * between.curvature * own for sign, between, own in known),
-        sum(between.variance * own for _, between, own in known),
+        sum(sign * between.curvature * share for sign, between, share in found),
+        sum(between.variance * share for _, between, share in found),
     )
 
 

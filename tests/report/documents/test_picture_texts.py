@@ -117,7 +117,7 @@ def test_words_at_an_axis_are_translated():
     figure = Figure()
     axes = figure.add_subplot()
     axes.barh([0, 1], [1.0, 2.5])
-    axes.set_yticks([0, 1], ["matching of the pickets", "base"])
+    axes.set_yticks([0, 1], ["matching of the points", "base"])
     in_language({"one": figure}, "de")
     figure.canvas.draw()
     assert [text.get_text() for text in axes.get_yticklabels()] == ["Bildzuordnung der Punkte", "Basis"]

@@ -20,6 +20,8 @@ WIDE = 1.96
 """Standard deviations on either side within which 95 % of normally distributed values lie."""
 LEAST = 0.001
 """m³, below which a part of σ is as good as none."""
+MOST_BESIDE = 6
+"""Piles beside one another in a table; chosen [C]: a page has room for their names."""
 PICTURES = ("thickness", "budget")
 
 OWN_BASES = "a base for each of "
@@ -188,10 +190,16 @@ def _parts_of_piles(c: Mapping[str, Any], words: Words) -> list[Part]:
     if not piles:
         return []
     names = list(piles[0]["parts_m3"])
-    rows = [(breakable(one["name"]), *(two(words, one["parts_m3"].get(name) or None) for name in names),
-             two(words, one["sigma_m3"])) for one in piles]  # fmt: skip
-    columns = [words("volume.pile_sigma"), *(words.term("part", name) for name in names), words("part.together")]
-    return [table(columns, rows, words=1)]
+    # the names of the parts are long: they are rows as long as the piles fit beside one another
+    rows = [(words.term("part", name), *(two(words, one["parts_m3"].get(name) or None) for one in piles))
+            for name in names]  # fmt: skip
+    rows.append((words("part.together"), *(two(words, one["sigma_m3"]) for one in piles)))
+    heads = [words("volume.pile_sigma"), *(breakable(one["name"]) for one in piles)]
+    if len(piles) <= MOST_BESIDE:
+        return [table(heads, rows, words=1)]
+    names_of_parts, *of_piles = zip(*rows, strict=True)
+    each = [(head, *values) for head, values in zip(heads[1:], of_piles, strict=True)]
+    return [table([heads[0], *names_of_parts], each, words=1, small=True)]
 
 
 def _methods(c: Mapping[str, Any], words: Words) -> Part:

@@ -99,7 +99,7 @@ def _budget(c: Mapping[str, Any]) -> str:
         text += (
             f" Straight lines between the heights {held}: the ground is expected to hold "
             f"{with_sigma(abs(bent['value_m3']), bent['sigma_m3'])} m³ {side}. The volume is that of the surface as "
-            "given, so this is not in it; its σ counts it as ground between the pickets."
+            "given, so this is not in it; its σ counts it as ground between the points."
         )
     beyond = [beyond_of_side(c, name) for name in ("cut", "fill")]
     if beyond[0] is not None and beyond[1] is not None:

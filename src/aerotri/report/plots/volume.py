@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from aerotri.formats.results.volume import sigma_of_side
 from aerotri.report.plots.canvas import (
     ACCENT,
     GREY,
@@ -49,9 +50,9 @@ COLOURS = LinearSegmentedColormap.from_list("cut_and_fill", [FILL, "#8fb4d6", "#
 WORDS = {
     "adjustment": "adjustment (orientation, self-calibration; all heights correlated)",
     MODEL: "errors that groups of photographs share",
-    "matching": "matching of the pickets",
+    "matching": "matching of the points",
     LASTING: "matching, errors that neighbouring cells share",
-    "interpolation": "ground between the pickets",
+    "interpolation": "ground between the points",
     "base": "base",
     "boundary": "position of the boundary",
 }
@@ -78,7 +79,8 @@ def plot_thickness(found: ThicknessMap, boundary: Boundary, volumes: Volumes, co
     v = volumes.chosen
     subtitle = (
         f"surface less base: {plain(content['dtm'], 60)} over {plain(content['base']['name'], 60)}\n"
-        f"cut {_count(v.cut)} m³ on {_count(v.cut_area)} m², fill {_count(v.fill)} m³ on {_count(v.fill_area)} m²"
+        f"cut {_with_its_sigma(v.cut, content, 'cut')} m³ on {_count(v.cut_area)} m², fill "
+        f"{_with_its_sigma(v.fill, content, 'fill')} m³ on {_count(v.fill_area)} m²"
     )
     figure = new_figure(height + 1.95, "Cut and fill", subtitle)
     axes = axes_at(figure, 0.95, 0.95, width, height)
@@ -113,6 +115,12 @@ def plot_thickness(found: ThicknessMap, boundary: Boundary, volumes: Volumes, co
     return figure
 
 
+def _with_its_sigma(value: float, content: Mapping[str, Any], name: str) -> str:
+    """A cut or a fill to two digits of its σ; to three digits where no σ is known."""
+    sigma = sigma_of_side(content, name)
+    return _count(value) if sigma is None else with_sigma(value, sigma)
+
+
 def _mark_fill(axes: Axes, found: ThicknessMap) -> None:
     """The line of zero, and hatches below it: in black and white fill is as dark as cut."""
     x, y = found.grid.x(np.arange(found.grid.columns)), found.grid.y(np.arange(found.grid.rows))
@@ -130,7 +138,7 @@ def plot_budget(content: Mapping[str, Any]) -> Figure:
     s = content["sigma"]
     parts = [(WORDS[name], s["parts_m3"][name]) for name in s["parts_m3"]]
     parts.append(("together (root of the sum of squares)", s["sigma_m3"]))
-    apart = [] if s["curvature"] is None else [("ground beyond straight lines between heights", s["curvature"])]
+    apart = [] if s["curvature"] is None else [("ground beyond straight lines between points", s["curvature"])]
     apart += [(SYSTEMATIC[one["variant"]], one) for one in s["systematic"]["variants"]]
     share = 100.0 * s["sigma_m3"] / max(abs(content["net_m3"]), 1e-9)
     subtitle = (
@@ -138,7 +146,7 @@ def plot_budget(content: Mapping[str, Any]) -> Figure:
         f"{two_digits(1e3 * s['sigma_mean_height_m'])} mm of mean height\n"
     )
     if apart:
-        subtitle += f"hatched, on a scale of its own: {_hatched(s)}"
+        subtitle += f"hatched, with a scale of its own: {_hatched(s)}"
     upper, lower = BAR * len(parts), BAR * len(apart)
     figure = new_figure(upper + 1.6 + (lower + 0.75 if apart else 0.0), "How sure the volume is", subtitle)
     axes = axes_at(figure, 4.15, 0.6 + (lower + 0.75 if apart else 0.0), WIDTH - 5.35, upper)
@@ -160,9 +168,9 @@ def plot_budget(content: Mapping[str, Any]) -> Figure:
 
 def _hatched(s: Mapping[str, Any]) -> str:
     """What stands apart from the parts of σ."""
-    held = "are in the volume, not in σ" if s["systematic"]["in_the_volume"] else "would have been, not in σ"
-    said = [f"what uncorrected image errors {held}"] if s["systematic"]["variants"] else []
-    return "; ".join(said + ([] if s["curvature"] is None else ["what lines cut off, in σ"]))
+    held = "in the volume" if s["systematic"]["in_the_volume"] else "not in the volume"
+    said = [f"uncorrected image errors ({held}, not in σ)"] if s["systematic"]["variants"] else []
+    return ", ".join(said + ([] if s["curvature"] is None else ["ground between the points (in σ)"]))
 
 
 def _bars(axes: Axes, labels: list[str], values: list[float], texts: list[str], style: dict[str, Any]) -> None:
