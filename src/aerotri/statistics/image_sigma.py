@@ -9,7 +9,7 @@ from aerotri.statistics.camera_field import noise_beside_field
 
 
 def image_sigma_of_cameras(calibration: Adjustment) -> np.ndarray:
-    """(c,) mm, the median σ of the image coordinates of a camera after the adjustment; of all cameras where one has none.
+    """(c,) mm, the median σ of image coordinates of each camera after the adjustment; of all where one has none.
 
     σ̂0 times what was stated; beside a random field of the camera the noise in place of σ̂0.
 
