@@ -50,6 +50,7 @@ INSIDE = {
     "prove/volume_cut_fill.py": "volumes of both sides and their σ, of pickets at stated places",
     "prove/volume_drawn_boundary.py": "volumes and σ of pickets at stated places, for outlines that move with them",
     "prove/volume_epochs.py": "the adjustment's part of σ alone, of pickets at stated places",
+    "prove/volume_measured_base.py": "volumes over a measured base and the parts of their σ, at stated places",
     "prove/volume_proof/simulated.py": "every part of σ alone, of pickets at stated places",
     "prove/volume_spline_base.py": "σ of a base alone",
     "reproduce/paper_003_deformation/even_odd.py": "deformation at single points, by another orientation",

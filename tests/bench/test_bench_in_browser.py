@@ -188,7 +188,7 @@ def test_new_control_point_is_made_by_marks_in_two_photographs_and_taken_back(pa
     p.select_option("#sheet select", "new_control")
     p.click("#new-begin")
     p.wait_for_selector("#message:not([hidden])")
-    assert "no number" in p.inner_text("#message")
+    assert "not a number" in p.inner_text("#message")
     for k, value in enumerate(("100.5", "200.25", "30", "0.02", "0.02", "0.03")):
         p.fill(f"#new-{k}", value)
     p.click("#new-begin")

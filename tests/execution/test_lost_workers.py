@@ -49,3 +49,13 @@ def test_workers_that_dask_has_given_up_are_begun_anew(tmp_path, monkeypatch):
     work = Work(toy_tasks.written, shared, tasks, [str(task) for task in tasks], "tasks", tmp_path, 0)
     with cluster.Dask("", 1, lambda text: None) as executor:
         assert executor.run(work) == tasks
+
+
+def test_workers_are_there_whenever_they_are_asked_for(tmp_path, monkeypatch):
+    """A client looks at its scheduler by itself, too, and then keeps no workers."""
+    often = {**cluster.OWN_CLUSTER, "distributed.client.scheduler-info-interval": "1 ms"}
+    monkeypatch.setattr(cluster, "OWN_CLUSTER", often)
+    work = Work(toy_tasks.squared, 0, [0], ["a"], "tasks", tmp_path, 0)
+    with cluster.Dask("", 1, lambda text: None) as executor:
+        assert executor.run(work) == [0]
+        assert {len(executor._workers()) for _ in range(500)} == {1}

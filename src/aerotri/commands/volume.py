@@ -97,13 +97,13 @@ def run_volume(
 def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
     """What the user reads of the volume."""
     from aerotri.deformation.restitution import ORIENTED
-    from aerotri.formats.results.volume import boundary_in_words, sigma_of_side
+    from aerotri.formats.results.volume import boundary_in_words
     from aerotri.report.quality import with_sigma
 
     c, s = content, content["sigma"]
     whole = _Whole.of(c)
     net = whole.told(c["net_m3"], None if s is None else s["sigma_m3"])
-    cut, fill = (whole.told(c[f"{name}_m3"], sigma_of_side(c, name)) for name in ("cut", "fill"))
+    cut, fill = (whole.side(c, name) for name in ("cut", "fill"))
     lines = [
         f"net {net}{'' if s is None else ' (1 σ)'}: cut {cut}, fill {fill}; {c['method']}, over {c['base']['name']}, "
         f"{in_digits(c['boundary']['area_m2'], 6)} m² inside {boundary_in_words(c['boundary'])}"
@@ -133,6 +133,12 @@ class _Whole:
         largest = max(abs(content[f"{name}_m3"]) for name in ("net", "cut", "fill"))
         digits = 5 if largest <= 0.0 else 5 - floor(log10(largest))
         return cls(min(max(digits, 0), 3))
+
+    def side(self, content: dict[str, Any], name: str) -> str:
+        """The cut or the fill."""
+        from aerotri.formats.results.volume import sigma_of_side
+
+        return self.told(content[f"{name}_m3"], sigma_of_side(content, name))
 
     def told(self, value: float, sigma: float | None) -> str:
         """m³, to two digits of σ where there is one."""

@@ -197,7 +197,8 @@ class Dask:
             self._say("Dask dashboard: needs bokeh, pip install bokeh")
 
     def _workers(self) -> dict[str, Any]:
-        return self._client.scheduler_info(n_workers=-1)["workers"]
+        # asked anew: what the client keeps loses its workers whenever it looks at the scheduler by itself
+        return self._client.sync(self._client.scheduler.identity, n_workers=-1)["workers"]
 
     def _resources(self, work: Work[Any, Any, Any]) -> dict[str, Any]:
         """What a task takes of a worker.
