@@ -59,3 +59,24 @@ def test_workers_are_there_whenever_they_are_asked_for(tmp_path, monkeypatch):
     with cluster.Dask("", 1, lambda text: None) as executor:
         assert executor.run(work) == [0]
         assert {len(executor._workers()) for _ in range(500)} == {1}
+
+
+@pytest.mark.parametrize("failures", [2, 3])
+def test_workers_killed_as_they_begin_are_begun_again(failures, tmp_path, monkeypatch):
+    """As Dask says it of a worker that ended before it had connected; not without end."""
+    begun, begin = [], cluster.LocalCluster
+
+    def beginning(**given):
+        begun.append(1)
+        if len(begun) <= failures:
+            raise RuntimeError("Nanny failed to start.")
+        return begin(**given)
+
+    monkeypatch.setattr(cluster, "LocalCluster", beginning)
+    work = Work(toy_tasks.squared, 0, [0], ["a"], "tasks", tmp_path, 0)
+    with cluster.Dask("", 1, lambda text: None) as executor:
+        if failures < 3:
+            assert executor.run(work) == [0]
+        else:
+            with pytest.raises(InputError, match="no Dask workers could be started"):
+                executor.run(work)

@@ -173,15 +173,35 @@ class Dask:
     def _started(self) -> tuple[LocalCluster, Client]:
         """Workers that begin, and who speaks with them."""
         prepare_copies({**ONE_THREAD, **UNWATCHED}, ("distributed",))
-        there = available_bytes()
-        memory: dict[str, Any] = {} if there is None else {"resources": {MEMORY: SHARE * there / self._count}}
-        cluster = LocalCluster(
-            n_workers=self._count, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
-            silence_logs=logging.CRITICAL, env={**os.environ, **ONE_THREAD, **UNWATCHED}, **memory,
-        )  # fmt: skip
+        cluster = self._local_cluster()
         client = Client(cluster)
         client.register_plugin(_NotInterrupted())
         return cluster, client
+
+    def _local_cluster(self) -> LocalCluster:
+        """Workers on this machine; begun again where one was killed as it began.
+
+        Raises
+        ------
+        InputError
+            When they cannot be started.
+        """
+        there = available_bytes()
+        memory: dict[str, Any] = {} if there is None else {"resources": {MEMORY: SHARE * there / self._count}}
+        for left in reversed(range(MOST_TRIES)):
+            try:
+                return LocalCluster(
+                    n_workers=self._count, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
+                    silence_logs=logging.CRITICAL, env={**os.environ, **ONE_THREAD, **UNWATCHED}, **memory,
+                )  # fmt: skip
+            except (RuntimeError, OSError) as error:
+                if not left:
+                    said = " ".join(str(error).split())[:300]
+                    raise InputError(
+                        f"no Dask workers could be started ({type(error).__name__}: {said})",
+                        "give --executor processes:N",
+                    ) from error
+        raise AssertionError
 
     def _end(self) -> None:
         """End the workers; what kept them from beginning was told where they were asked for."""
