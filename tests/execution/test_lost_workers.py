@@ -40,7 +40,7 @@ def test_a_command_does_not_wait_for_its_own_workers_for_ever(address, monkeypat
 def test_workers_that_dask_has_given_up_are_begun_anew(tmp_path, monkeypatch):
     """Dask gives a worker up that does not come back in time, and starts no other by itself."""
     monkeypatch.setattr(cluster, "LOOK_S", 0.5)
-    monkeypatch.setattr(cluster, "GONE_S", 20.0)
+    monkeypatch.setattr(cluster, "AWAY_S", 4.0)
     monkeypatch.setattr(
         cluster, "OWN_CLUSTER", {**cluster.OWN_CLUSTER, "distributed.deploy.lost-worker-timeout": "1 ms"}
     )

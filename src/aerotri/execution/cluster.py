@@ -47,6 +47,9 @@ UNWATCHED = {
 """Environment of such workers: they do not look fifty times a second how fast and where in the program they are."""
 CONNECT_S, LOOK_S = "20s", 5.0
 """For the scheduler to answer; between two looks whether there are workers."""
+AWAY_S = 30.0
+"""Without one of the workers that were started here, after which another takes its place [C]: several times what one
+needs to begin again on a busy machine."""
 GONE_S = 120.0
 """Without any worker of those that were started here, after which none is expected to come back [C]."""
 
@@ -66,6 +69,7 @@ class Dask:
         self._client: Any = None
         self._starting: Future[tuple[LocalCluster, Client]] | None = None
         self._told_waiting = False
+        self._away_since: float | None = None
 
     def __enter__(self) -> Self:
         if self._address:
@@ -166,9 +170,20 @@ class Dask:
                     self._told_waiting = True
 
     def _replace_lost(self) -> None:
-        """Begin others for those started here that Dask has given up, such as one that was killed as it began."""
-        if self._starting is not None and len(self._workers()) < self._count:
-            self._starting.result()[0].scale(self._count)
+        """Begin others for those started here that are long away: Dask gives up one that is killed as it begins."""
+        if self._starting is None:
+            return
+        there, now = len(self._workers()), time.monotonic()
+        if there >= self._count:
+            self._away_since = None
+        elif self._away_since is None:
+            self._away_since = now
+        elif now - self._away_since > AWAY_S:
+            # one that failed to begin keeps its place as long as its place is wanted
+            cluster = self._starting.result()[0]
+            cluster.scale(there)
+            cluster.scale(self._count)
+            self._away_since = now
 
     def _started(self) -> tuple[LocalCluster, Client]:
         """Workers that begin, and who speaks with them."""
