@@ -1,6 +1,7 @@
 """Workers started here that have all ended."""
 
 import queue
+from concurrent.futures import Future
 from types import SimpleNamespace
 
 import pytest
@@ -37,18 +38,23 @@ def test_a_command_does_not_wait_for_its_own_workers_for_ever(address, monkeypat
     assert len(said) == 1
 
 
-def test_workers_that_dask_has_given_up_are_begun_anew(tmp_path, monkeypatch):
-    """Dask gives a worker up that does not come back in time, and starts no other by itself."""
-    monkeypatch.setattr(cluster, "LOOK_S", 0.5)
-    monkeypatch.setattr(cluster, "AWAY_S", 4.0)
-    monkeypatch.setattr(
-        cluster, "OWN_CLUSTER", {**cluster.OWN_CLUSTER, "distributed.deploy.lost-worker-timeout": "1 ms"}
-    )
-    tasks = [0, 1, 2]
-    shared = (str(tmp_path), frozenset(tasks), 1)
-    work = Work(toy_tasks.written, shared, tasks, [str(task) for task in tasks], "tasks", tmp_path, 0)
-    with cluster.Dask("", 1, lambda text: None) as executor:
-        assert executor.run(work) == tasks
+def test_workers_that_are_long_away_are_replaced(monkeypatch):
+    """One that failed to begin gives its place up; one that begins again in time keeps it."""
+    monkeypatch.setattr(cluster, "AWAY_S", 10.0)
+    now, there, asked = [0.0], [3], []
+    monkeypatch.setattr(cluster.time, "monotonic", lambda: now[0])
+    executor = cluster.Dask("", 3, lambda text: None)
+    executor._starting = Future()
+    executor._starting.set_result((SimpleNamespace(scale=asked.append), None))
+    monkeypatch.setattr(executor, "_workers", lambda: dict.fromkeys(range(there[0])))
+    for second, count in ((0, 3), (5, 2), (14, 3), (15, 2), (24, 2)):
+        now[0], there[0] = float(second), count
+        executor._replace_lost()
+        assert asked == []
+    now[0] = 26.0
+    executor._replace_lost()
+    executor._replace_lost()
+    assert asked == [2, 3]
 
 
 def test_workers_are_there_whenever_they_are_asked_for(tmp_path, monkeypatch):
