@@ -13,6 +13,7 @@ Example: python tools/prove/volume_cut_fill.py --runs 200 --out results
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -159,6 +160,10 @@ HEADER = """| source, volume | runs | mean error m³ | expected m³ | RMS error 
 |---|---|---|---|---|---|---|---|---|"""
 
 
+OfSite = Callable[[str, range, list[str], Runs], list[str]]
+"""Lines of a site: of its name, the seeds, the sources that are wanted, and who does the runs."""
+
+
 def of_site(name: str, seeds: range, wanted: list[str], runs: Runs) -> list[str]:
     """The table of a site."""
     sources = [(part, frozenset([part])) for part in PARTS] + [("all together", ALL)]
@@ -173,26 +178,31 @@ def of_site(name: str, seeds: range, wanted: list[str], runs: Runs) -> list[str]
     return lines
 
 
-def main() -> None:
-    """Run, print, write where asked."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--runs", type=int, default=200)
+def prove(about: str | None, title: str, tool: str, names: Iterable[str], of_site: OfSite, count: int) -> None:
+    """Read the command line, run every site, print, write where asked.
+
+    Parameters
+    ----------
+    about : what the tool does. names : of the sites. of_site : gives the lines of one. count : runs if none is stated.
+    """
+    parser = argparse.ArgumentParser(description=(about or "").split("\n")[0])
+    parser.add_argument("--runs", type=int, default=count)
     parser.add_argument("--first", type=int, default=1, help="seed of the first run")
     parser.add_argument("--site", default="", help="only those whose name begins so")
     parser.add_argument("--source", nargs="*", default=[], help="only these sources of error")
     parser.add_argument("--out", type=Path)
     add_executor(parser)
     options = parser.parse_args()
-    lines = ["# σ of cut and of fill against their scatter (tools/prove/volume_cut_fill.py)"]
+    lines = [f"# {title} (tools/prove/{tool}.py)"]
     print(lines[0])
     seeds = range(options.first, options.first + options.runs)
     with runs_of(options) as runs:
-        for name in (name for name in SITES if name.startswith(options.site)):
+        for name in (name for name in names if name.startswith(options.site)):
             lines += of_site(name, seeds, options.source, runs)
     if options.out is not None:
         options.out.mkdir(parents=True, exist_ok=True)
-        (options.out / "volume_cut_fill.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        (options.out / f"{tool}.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main()
+    prove(__doc__, "σ of cut and of fill against their scatter", "volume_cut_fill", SITES, of_site, 200)

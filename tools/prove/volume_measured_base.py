@@ -13,10 +13,8 @@ Example: python tools/prove/volume_measured_base.py --runs 60 --out results
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
@@ -29,8 +27,8 @@ from aerotri.volume.parts import Part, part_of_pickets
 from aerotri.volume.pickets import pickets_where_seen
 from aerotri.volume.settings import SigmaOptions
 from aerotri.volume.shared import places_apart
-from runs_elsewhere import Runs, add_executor, runs_of
-from volume_cut_fill import HEADER, NAMES, Run, row
+from runs_elsewhere import Runs
+from volume_cut_fill import HEADER, NAMES, Run, prove, row
 from volume_proof.simulated import MATCHING_UM, TinSurface, adjusted_block, boundary, free_of_error, measured_pickets
 from volume_proof.sites import Heights, Site, dump, make_site, rolling
 
@@ -146,26 +144,5 @@ def of_site(name: str, seeds: range, wanted: list[str], runs: Runs) -> list[str]
     return lines
 
 
-def main() -> None:
-    """Run, print, write where asked."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--runs", type=int, default=60)
-    parser.add_argument("--first", type=int, default=1, help="seed of the first run")
-    parser.add_argument("--site", default="", help="only those whose name begins so")
-    parser.add_argument("--source", nargs="*", default=[], help="only these sources of error")
-    parser.add_argument("--out", type=Path)
-    add_executor(parser)
-    options = parser.parse_args()
-    lines = ["# σ of cut and of fill over a measured base (tools/prove/volume_measured_base.py)"]
-    print(lines[0])
-    seeds = range(options.first, options.first + options.runs)
-    with runs_of(options) as runs:
-        for name in (name for name in SITES if name.startswith(options.site)):
-            lines += of_site(name, seeds, options.source, runs)
-    if options.out is not None:
-        options.out.mkdir(parents=True, exist_ok=True)
-        (options.out / "volume_measured_base.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    prove(__doc__, "σ of cut and of fill over a measured base", "volume_measured_base", SITES, of_site, 60)
