@@ -15,6 +15,7 @@ import numpy as np
 from scipy.interpolate import NearestNDInterpolator
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from aerotri.terrain.dense import spline
 from aerotri.terrain.dense._resampling_kernels import resample, within
 from aerotri.terrain.dense.grey_store import GreyStore
 from aerotri.terrain.dense.place import Place
@@ -225,9 +226,17 @@ def _resampled(
     known = np.empty((rows, columns), np.bool_)
     last = pixels.shape[1] - 2.0 - edge[0], pixels.shape[0] - 2.0 - edge[1]
     within(x, y, (edge[0] + 1.0, edge[1] + 1.0), last, known)
-    out = np.empty((rows, columns), np.float32)
-    resample(pixels, x, y, known, out)
+    out = np.zeros((rows, columns), np.float32)
+    if known.any():
+        (left, right), (above, below) = (_reached(place_of[:, :, axis][known], pixels.shape[1 - axis]) for axis in (0, 1))
+        coefficients = spline.of_surface(pixels[above:below, left:right])
+        resample(coefficients, x - np.float32(left), y - np.float32(above), known, out)
     return out, known
+
+
+def _reached(at: np.ndarray, count: int) -> tuple[int, int]:
+    """First row or column of pixels, and the one after the last, that splines at such places are made of."""
+    return max(int(at.min()) - spline.REACH - 1, 0), min(int(at.max()) + spline.REACH + 3, count)
 
 
 def _mean_depth(g: EpipolarGeometry) -> float:
