@@ -12,7 +12,7 @@ from aerotri.observations import Block
 from aerotri.pipeline.chain import adjust_keeping_system
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.truth import Truth
-from aerotri.statistics.camera_field import CameraField, camera_field, known_field
+from aerotri.statistics.camera_field import CameraField, camera_field, known_field, missing_in_sigma, not_looked_for
 from aerotri.statistics.cluster_fields import field_equations, half_formats, node_counts
 from aerotri.statistics.clusters import Clusters
 from aerotri.terrain.adjustment_part import variances_at
@@ -161,3 +161,17 @@ def test_rays_move_by_the_errors_at_their_places():
 
 def test_a_field_that_is_switched_off_is_not_found():
     assert known_field(adjust_keeping_system(simulated(1, "brown:K1", 5.0)[0])) is None
+
+
+def test_blocks_that_are_not_looked_at_say_why(monkeypatch):
+    found = adjust_keeping_system(with_adjustment(simulated(1, "brown:K1")[0], model_part="on"))
+    assert not_looked_for(found) == missing_in_sigma(found) == ""
+    with monkeypatch.context() as changed:
+        changed.setattr("aerotri.statistics.camera_field.MOST_PHOTOGRAPHS", 9)
+        assert missing_in_sigma(found).startswith("the block has 10 photographs, more than 9: image errors that ")
+        assert camera_field(found) is None
+        off = adjust_keeping_system(simulated(1, "brown:K1")[0])
+        assert not_looked_for(off)
+        assert missing_in_sigma(off) == ""
+    free = adjust_keeping_system(with_adjustment(simulated(1, "brown:K1")[0], model_part="on", datum="inner"))
+    assert missing_in_sigma(free).startswith("the datum of the block is free: image errors that ")

@@ -27,6 +27,7 @@ import numpy as np
 
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.cluster_fields import (
+    NODES,
     SIZES,
     FieldEquations,
     correlations,
@@ -38,7 +39,7 @@ from aerotri.statistics.cluster_fields import (
     spread_of_fields,
 )
 from aerotri.statistics.cluster_test import LEVEL
-from aerotri.statistics.clusters import CAMERA, LARGE, Clusters
+from aerotri.statistics.clusters import CAMERA, Clusters
 
 LENGTHS = (0.2, 0.28, 0.4, 0.57, 0.8, 1.13, 1.6)
 """Correlation lengths looked at, in half diagonals of each format, from that of the nodes to that of the format."""
@@ -49,6 +50,8 @@ LEAST = 1e-12
 """Of vᵀPv that no field explains: rounding."""
 MOST_CAMERAS = 12
 """Cameras with a field each at most; chosen [C]: each has seventy columns in the equations."""
+MOST_PHOTOGRAPHS = 60_000
+"""Photographs times cameras at most; chosen [C]: each takes 20 kB of memory and a millisecond of one processor."""
 
 
 _KNOWN: WeakKeyDictionary[Adjustment, CameraField | None] = WeakKeyDictionary()
@@ -120,24 +123,52 @@ def is_of_camera(found: Adjustment) -> bool:
     return part is not None and part.counts and (part.clusters == 1 or part.scheme == CAMERA)
 
 
-def camera_field(found: Adjustment) -> CameraField | None:
-    """The fields; None where the residuals are explained by noise, or say too little.
+def too_little_said(found: Adjustment) -> str:
+    """Why the residuals say too little for a field: no final σ0, or too few of them; '' where they say enough."""
+    outcome, u = found.local.outcome, found.system.unknowns
+    if found.solution.status != "converged" or not outcome.sigma0 > 0.0:
+        return "the adjustment has no final σ0"
+    coordinates = 2 * NODES[0] * NODES[1] * len(np.unique(u.block.images.camera[u.images]))
+    return f"the redundancy is below {2 * coordinates}" if outcome.redundancy < 2 * coordinates else ""
 
-    Too little say those of an adjustment without an end, and fewer than twice as many as the field has nodes. A field
-    in a free block would depend on which coordinates hold it: there is none.
+
+def not_looked_for(found: Adjustment) -> str:
+    """Why no field is looked for although there may be one, '' where it is.
+
+    A field in a free block would depend on which coordinates hold it.
     """
+    u = found.system.unknowns
+    photographs, cameras = len(u.images), len(np.unique(u.block.images.camera[u.images]))
+    if u.block.settings.adjustment.is_free:
+        return "the datum of the block is free"
+    if cameras > MOST_CAMERAS:
+        return f"the block has {cameras} cameras, more than {MOST_CAMERAS}"
+    if photographs * cameras > MOST_PHOTOGRAPHS:
+        most = f"{MOST_PHOTOGRAPHS // cameras}" + (f" with {cameras} cameras" if cameras > 1 else "")
+        return f"the block has {photographs} photographs, more than {most}"
+    return ""
+
+
+def missing_in_sigma(found: Adjustment) -> str:
+    """A sentence where σ lacks what the parameters may leave of the errors of cameras, '' else.
+
+    None where the user has switched it off, or the residuals say too little to have a reason to fear it.
+    """
+    reason = not_looked_for(found)
+    if not reason or found.system.unknowns.block.settings.adjustment.model_part == "off" or too_little_said(found):
+        return ""
+    return f"{reason}: image errors that the additional parameters leave were not looked for and are not in σ"
+
+
+def camera_field(found: Adjustment) -> CameraField | None:
+    """The fields; None where the residuals are explained by noise, and for the reasons of the two functions above."""
+    if too_little_said(found) or not_looked_for(found):
+        return None
     system, solution, outcome = found.system, found.solution, found.local.outcome
     u = system.unknowns
-    cameras = np.unique(u.block.images.camera[u.images])
-    if solution.status != "converged" or not outcome.sigma0 > 0.0 or u.block.settings.adjustment.is_free:
-        return None
-    if len(cameras) > MOST_CAMERAS or len(u.images) * len(cameras) > LARGE:
-        return None
     factor = system.factorise(solution.equations)
     one = Clusters(CAMERA, np.zeros(len(u.images), np.int64), ("",), 1)
     equations = field_equations(system, solution, factor, one)
-    if outcome.redundancy < 2 * len(equations.scores):
-        return None
     gain, variance, noise, length = _most_likely(found, equations, outcome.sigma0**2 * outcome.redundancy)
     if np.exp(-0.5 * gain) >= LEVEL:
         return None

@@ -23,6 +23,7 @@ from aerotri.rasters.between_places import between_places, lattice_of, spread_pl
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.camera_field import CameraField, is_of_camera
 from aerotri.statistics.covariance import inner_datum, is_inner
+from aerotri.statistics.image_sigma import weight_of_cameras
 from aerotri.statistics.model_of_functions import model_of_functions
 from aerotri.terrain.pickets import Pickets
 
@@ -243,11 +244,11 @@ def _linearised(
     )  # fmt: skip
 
 
-def _gain(by_point: np.ndarray, picket: np.ndarray, count: int) -> np.ndarray:
-    """(r, 3, 2) of rays, by which the points that they intersect in move."""
-    normal = np.zeros((count, 3, 3))
-    np.add.at(normal, picket, np.einsum("rki,rkj->rij", by_point, by_point))
-    return np.linalg.solve(normal[picket], np.swapaxes(by_point, 1, 2))
+def _gain(by_point: np.ndarray, weight: np.ndarray, picket: np.ndarray, count: int) -> np.ndarray:
+    """(r, 3, 2) of rays with weights (r,), by which the points that they intersect in move."""
+    normal, weighted = np.zeros((count, 3, 3)), by_point * weight[:, None, None]
+    np.add.at(normal, picket, np.einsum("rki,rkj->rij", weighted, by_point))
+    return np.linalg.solve(normal[picket], np.swapaxes(weighted, 1, 2))
 
 
 def _gain_in_plan(by_point: np.ndarray) -> np.ndarray:
@@ -271,7 +272,9 @@ def _by_unknowns(
     picket, column = np.nonzero(photographs >= 0)
     image = rows[photographs[picket, column]]
     rays = _linearised(restitution.true, local, image, picket, u.lens.base.shape[1])
-    gain = _gain_in_plan(rays.by_point) if plan else _gain(rays.by_point, picket, len(local))
+    camera = calibration.local.block.images.camera[image]
+    weight = weight_of_cameras(calibration)[camera]
+    gain = _gain_in_plan(rays.by_point) if plan else _gain(rays.by_point, weight, picket, len(local))
     own = in_system[image]
     by_image = rays.by_orientation.copy()
     by_image[:, :, 3:] = rays.by_orientation[:, :, 3:] @ u.turn(state)[own]
@@ -305,6 +308,5 @@ def _by_unknowns(
     if left is None:
         return j
     by_errors = np.zeros((len(local), 3, left.by_unknowns.shape[1]))
-    camera = calibration.local.block.images.camera[image]
     np.add.at(by_errors, picket, left.moved(gain, measured, camera))
     return np.concatenate([j, by_errors], axis=2)
