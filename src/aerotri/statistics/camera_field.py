@@ -223,7 +223,7 @@ def _most_likely(found: Adjustment, equations: FieldEquations, squares: float) -
 
     Parameters
     ----------
-    squares : vᵀPv.
+    squares : σ̂0² times the redundancy: vᵀPv, with a robust estimator that of so many observations of full weight.
     """
     u, redundancy = found.system.unknowns, found.local.outcome.redundancy
     cameras = u.block.cameras
