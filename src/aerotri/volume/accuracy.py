@@ -42,7 +42,8 @@ SMOOTHEST_BELOW = 0.9
 PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")
 MOVES = "the boundary is taken as drawn on the surface: a shift or turn of the whole block moves both"
 MODEL = "model"
-"""The part beside these where groups of photographs share errors: the model part of the adjustment."""
+"""The part beside these of image errors that photographs share: those of a group, and those that the additional
+parameters leave in all photographs of a camera."""
 LASTING = "matching_shared"
 """The part beside these of dense surfaces: errors of the matching that do not average out."""
 
