@@ -1,4 +1,4 @@
-"""What a spline through the boundary leaves out, as the ground around tells it."""
+"""What a spline through the boundary leaves out of the ground below, by the ground around."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scipy.spatial.distance import cdist
 
 from aerotri.rasters.grids import Grid
 from aerotri.rasters.held import HeldRaster
-from aerotri.volume.accuracy import base_left_out
+from aerotri.volume.accuracy import spline_variance
 from aerotri.volume.bases import SplineBase, parse_base, quadrature_of
 from aerotri.volume.boundary import Boundary, boundary_of
 from aerotri.volume.ground_around import GroundAround, covariances, ground_around
@@ -38,11 +38,12 @@ def around(z: np.ndarray, boundary: Boundary = OUTLINE) -> GroundAround:
     return found
 
 
-def left_out(z: np.ndarray, boundary: Boundary = OUTLINE) -> tuple[float, float]:
+def sigma(z: np.ndarray, boundary: Boundary = OUTLINE) -> float:
+    """m³."""
     base, surface = on(z, boundary)
-    found = base_left_out(base, boundary, surface)
+    found = spline_variance(base, boundary, surface)
     assert found is not None
-    return found
+    return float(np.sqrt(found))
 
 
 def waves(rng: np.random.Generator, length: float) -> np.ndarray:
@@ -72,74 +73,63 @@ def test_errors_of_the_base_are_as_its_sigma_says(ground: Callable[[np.random.Ge
     z = []
     for seed in range(12):
         below = ground(np.random.default_rng([seed, 1]))
-        z.append(of_spline(below) / np.sqrt(left_out(below)[1]))
+        z.append(of_spline(below) / sigma(below))
     # chi-square of twelve, 99.9 %: with waves of 120 m a roughness carried inwards gives hundreds
     assert 0.4 < np.sqrt(np.mean(np.square(z))) < 1.7
 
 
-def test_what_is_expected_is_what_comes_where_the_ground_around_tells_it():
-    for seed in range(4):
-        below = waves(np.random.default_rng([seed, 2]), 120.0)
-        assert left_out(below)[0] == pytest.approx(of_spline(below), abs=0.1 * abs(of_spline(below)) + 5.0)
-
-
 def test_a_plane_leaves_nothing_out():
-    expected, square = left_out(50.0 + 0.125 * (X - 1000.0) - 0.25 * (Y - 2000.0))
-    assert abs(expected) < 1e-3 * OUTLINE.area
-    assert np.sqrt(square) < 1e-3 * OUTLINE.area
-    assert left_out(np.full(X.shape, 100.0)) == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert sigma(50.0 + 0.125 * (X - 1000.0) - 0.25 * (Y - 2000.0)) < 1e-3 * OUTLINE.area
+    assert sigma(np.full(X.shape, 100.0)) < 1e-6
 
 
 def test_heights_ten_times_as_large_leave_ten_times_as_much():
     below = fractal(np.random.default_rng(3)) - 100.0
-    one, ten = left_out(below), left_out(10.0 * below)
-    assert ten[0] == pytest.approx(10.0 * one[0], rel=1e-4)
-    assert ten[1] == pytest.approx(100.0 * one[1], rel=1e-4)
+    assert sigma(10.0 * below) == pytest.approx(10.0 * sigma(below), rel=1e-4)
 
 
 def test_a_plane_added_changes_nothing():
     below = fractal(np.random.default_rng(4))
-    one, tilted = left_out(below), left_out(below + 0.3 * (X - 1000.0) + 20.0)
-    assert tilted[0] == pytest.approx(one[0], abs=1e-3 * OUTLINE.area)
-    assert tilted[1] == pytest.approx(one[1], rel=1e-2)
+    assert sigma(below + 0.3 * (X - 1000.0) + 20.0) == pytest.approx(sigma(below), rel=1e-2)
 
 
-def test_kriging_is_that_of_a_plane_with_no_knowledge_beforehand():
-    """Each model against the conditional normal distribution with a plane of a very large variance."""
-    below = waves(np.random.default_rng(5), 60.0)
-    found = around(below)
-    base, surface = on(below)
-    places, weight = quadrature_of(OUTLINE)
-    at = (places - found.middle) / found.size
-    ones = [np.column_stack([np.ones(len(a)), a]) for a in (found.places, at)]
-    z = surface.sample(*(found.places * found.size + found.middle).T) - found.height
-    for model in found.models:
-        alone = replace(found, models=(model,))
-        expected, square = alone.left_out(places, weight, float(base.integral @ base.z))
-        variance = model.covariance(cdist(found.places, found.places)) + model.alone * np.eye(len(z))
-        plane = 1e5 * ones[0] @ ones[0].T
-        to = (model.covariance(cdist(found.places, at)) + 1e5 * ones[0] @ ones[1].T) @ weight
-        own = weight @ (model.covariance(cdist(at, at)) + 1e5 * ones[1] @ ones[1].T) @ weight
-        weights = np.linalg.solve(variance + plane, to)
-        mean = float(weights @ z)
-        off = float(base.integral @ base.z) - found.height * weight.sum() - mean
-        assert expected == pytest.approx(off, abs=1e-3 * OUTLINE.area)
-        assert square - expected**2 == pytest.approx(model.level * (own - to @ weights), rel=0.05, abs=1.0)
+def test_the_foot_of_what_is_measured_is_no_ground():
+    below = 100.0 + 0.02 * np.random.default_rng(8).normal(size=X.shape)
+    foot = 0.5 * np.exp(-((np.hypot(X - 1000.0, Y - 2000.0) - 24.0).clip(0.0) ** 2))
+    assert sigma(below + foot) == pytest.approx(sigma(below), rel=0.1)
+
+
+def test_variance_is_that_of_a_covariance():
+    """Of the only probable one, summed pair by pair."""
+    found = GroundAround(20.0, (replace(around(fractal(np.random.default_rng(5))).models[0], probability=1.0),))
+    model, base = found.models[0], on(fractal(np.random.default_rng(5)))[0]
+    weights = np.concatenate([[OUTLINE.area], -base.integral])
+    xy = np.concatenate([[[1000.0, 2000.0]], base.xy])
+    total = sum(
+        model.level * one * other * float(model.covariance(np.array([np.hypot(*(a - b)) / 20.0]))[0])
+        for one, a in zip(weights, xy, strict=True)
+        for other, b in zip(weights, xy, strict=True)
+    )
+    assert found.contrast_variance(xy, weights) == pytest.approx(total, rel=1e-6)
 
 
 def test_a_neighbour_that_is_measured_as_well_is_no_ground():
     below = 100.0 + 0.02 * np.random.default_rng(6).normal(size=X.shape)
     neighbour = shapely.box(1026.0, 1980.0, 1046.0, 2020.0)
     below = np.where(np.asarray(shapely.contains_xy(neighbour, X, Y)), below + 5.0, below)
-    counted = left_out(below)
-    apart = left_out(below, replace(OUTLINE, beside=neighbour.buffer(1.0)))
-    assert np.sqrt(apart[1]) < 0.2 * np.sqrt(counted[1])
+    assert sigma(below, replace(OUTLINE, beside=neighbour.buffer(1.0))) < 0.2 * sigma(below)
+
+
+def test_a_surface_that_ends_near_the_boundary_is_judged_by_what_there_is():
+    below = fractal(np.random.default_rng(9))
+    near = np.where(shapely.contains_xy(OUTLINE.polygon.buffer(4.0), X, Y), below, np.nan)
+    assert 0.2 * sigma(below) < sigma(near) < 5.0 * sigma(below)
 
 
 def test_no_ground_outside_says_nothing():
-    z = np.where(shapely.contains_xy(OUTLINE.polygon.buffer(1.5), X, Y), 100.0, np.nan)
+    z = np.where(shapely.contains_xy(OUTLINE.polygon.buffer(1.2), X, Y), 100.0, np.nan)
     base, surface = on(z)
-    assert base_left_out(base, OUTLINE, surface) is None
+    assert spline_variance(base, OUTLINE, surface) is None
 
 
 def test_every_covariance_is_one():

@@ -28,8 +28,6 @@ from aerotri.volume.shared import (
 
 ALONG_EDGE = 33
 """Places along every edge of the boundary."""
-SAID_BEYOND = 0.5
-"""Share of σ of the base beyond which the user is told what the ground around suggests of it [C]."""
 PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")
 MOVES = "the boundary is taken as drawn on the surface: a shift or turn of the whole block moves both"
 MODEL = "model"
@@ -135,12 +133,12 @@ def volume_sigma(
         share, by name and value, by their covariance.
     """
     region = part.region
-    left = base_left_out(base, boundary, surface, region)
+    below = spline_variance(base, boundary, surface, region)
     stated = options.base_sigma * (boundary.area if region is None else region.area)
-    ground = stated**2 + (0.0 if left is None else left[1])
+    ground = stated**2 + (below or 0.0)
     sign = 0 if region is None else region.sign
     edge = boundary_variance(surface, base, boundary, options.boundary_sigma, sign)
-    notes = _notes(part, base_part, base, left, options)
+    notes = _notes(part, base_part, base, below is not None, options)
     beside = _Beside(ground, edge, notes, region.line if region is not None and sign else None)
     return _assembled(part, base_part, beside, options)
 
@@ -286,10 +284,8 @@ def boundary_variance(surface: Surface, base: Base, boundary: Boundary, sigma: f
     return sigma**2 * total
 
 
-def base_left_out(
-    base: Base, boundary: Boundary, surface: Surface, region: Region | None = None
-) -> tuple[float, float] | None:
-    """By what a spline is above the ground below it: expected m³, and the mean square m⁶, from the ground around.
+def spline_variance(base: Base, boundary: Boundary, surface: Surface, region: Region | None = None) -> float | None:
+    """m⁶, of what a spline leaves out of the ground below it, from the ground around.
 
     None where the base is no spline, or too little ground is known around it.
 
@@ -302,26 +298,10 @@ def base_left_out(
         return None
     places, weight = quadrature_of(boundary) if region is None else (region.places, region.weight)
     integral = base.integral if region is None else integral_of_spline(base, places, weight)
-    return around.left_out(places, weight, float(integral @ base.z))
+    return around.contrast_variance(np.concatenate([places, base.xy]), np.concatenate([weight, -integral]))
 
 
-def _of_spline(left: tuple[float, float] | None) -> list[str]:
-    """How the base was judged, and what the ground around says of it."""
-    if left is None:
-        return ["too little ground outside the boundary to judge the base by"]
-    said, (expected, square) = ["the base is judged by the ground outside the boundary"], left
-    if abs(expected) > SAID_BEYOND * np.sqrt(square):
-        way, amount = ("high" if expected > 0.0 else "low"), in_digits(abs(expected), 2)
-        said.append(
-            f"the ground outside the boundary suggests that the base is too {way} by {amount} m³ in all; this is in σ "
-            "of the base, the volume is not corrected: give a base that was surveyed if there is one"
-        )
-    return said
-
-
-def _notes(
-    part: Part, base_part: Part | None, base: Base, left: tuple[float, float] | None, options: SigmaOptions
-) -> tuple[str, ...]:
+def _notes(part: Part, base_part: Part | None, base: Base, judged: bool, options: SigmaOptions) -> tuple[str, ...]:
     notes = []
     if part.unseen > 0.0:
         unseen = f"{in_digits(part.unseen, 4)} m² are seen by too few photographs of the block"
@@ -331,7 +311,8 @@ def _notes(
     if base_part is None and not isinstance(base, PlaneBase | SplineBase) and options.base_sigma <= 0.0:
         notes.append("the base counts as free of error: give its σ with --base-adjustment or --base-sigma")
     if isinstance(base, SplineBase):
-        notes += _of_spline(left)
+        said = "the base is judged by the ground outside the boundary, taken for of the same kind as the ground below"
+        notes.append(said if judged else "too little ground outside the boundary to judge the base by")
     if isinstance(base, PlaneBase) and base.nodes is None and options.base_sigma <= 0.0:
         notes.append(f"the base ({base.name}) counts as free of error: give its σ with --base-sigma")
     if options.boundary_from == "product":

@@ -1,19 +1,17 @@
-"""What a spline through the boundary leaves out of the ground below it, as the ground around tells it.
+"""How well a spline through the boundary tells the ground below it, from the ground around.
 
 [C] The ground is a plane and a random function. Its covariance is not known: ground that is rough at all sizes, smooth
 ground of some size, or ground that rolls in waves. Each of `covariances` is as probable beforehand as the others, with
-every share of what is rough within a cell; the heights around the boundary and along it make one of them more probable
-than another by its restricted likelihood [L: Patterson & Thompson 1971], and what is asked for is averaged over them
-[L: Handcock & Stein 1993].
+every share of what is rough within a cell; the heights around the boundary make one of them more probable than another
+by its restricted likelihood [L: Patterson & Thompson 1971], and the variance is averaged over them [L: Handcock & Stein
+1993].
 
-[D] Given these heights z the integral of the ground below, I = ∫z, has the mean Î = x·z and the variance C [L:
-universal kriging of a block], with K of the places among themselves, k to the integral, κ of the integral and the terms
-A and a of a plane:
+[D] With the weights λ of the ground below, its places and the integral of the spline by the heights it goes through
+(negative), the spline leaves out Σλz, which no plane moves, with the variance λᵀKλ. Of K = s²·k + τ the likelihood
+tells s² as the mean square of the contrasts of the heights over their variances. No covariance is quite right: the
+largest patterns of a ring tell what reaches over a boundary, and where they alone say more s² is theirs [C].
 
-    [K + τ, A; Aᵀ, 0]·[x; μ] = [k; a],   C = s²·(κ − x·k − μ·a).
-
-The base stays the spline, with the integral B: what it leaves out has the mean square (B − Î)² + C. Where the ground
-around says nothing of the ground below it is what the covariance alone makes it.
+Heights near the boundary do not count where there are others: they may stand on the foot of what is measured.
 """
 
 from __future__ import annotations
@@ -25,7 +23,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 import shapely
-from scipy.linalg import lu_factor, lu_solve
 from scipy.spatial.distance import cdist
 from scipy.special import j0
 from shapely.geometry.base import BaseGeometry
@@ -34,10 +31,10 @@ from aerotri.rasters.grids import Grid
 from aerotri.volume.bases import SplineBase, Surface, sampled
 from aerotri.volume.boundary import Boundary
 
-RING_SHARE = 0.3
-"""Width of the ring of ground outside the boundary that a base is judged by, over the root of the boundary's area."""
-PLACES_AROUND, PLACES_ALONG = 130, 70
-"""Heights of the ring and along the boundary that are used at most; chosen [C]: more take longer and change little."""
+RING_FROM, RING_TO = 0.1, 0.4
+"""Edges of the ring of ground outside the boundary that a base is judged by, over the root of the boundary's area."""
+PLACES = 160
+"""Heights of the ring that are used at most; chosen [C]: more take longer and change little."""
 ENOUGH = 30
 """Heights of the ring from which ground is judged at least."""
 AT_ONCE = 4
@@ -49,69 +46,47 @@ LENGTHS, WAVES = np.geomspace(0.06, 1.6, 6), np.geomspace(0.3, 5.0, 6)
 the root of the area."""
 FADING = (0.4, 1.5)
 """Over how many of their lengths waves keep in step."""
-ROUGH_WITHIN = np.geomspace(1e-3, 1.0, 7)
-"""Variance that a place has alone, over the mean of what it shares; chosen [C] the least: a covariance is not to be
-chosen by details of a thirtieth of the heights."""
+ROUGH_WITHIN = np.geomspace(1e-2, 1.0, 5)
+"""τ, variance that a place has alone, over the mean power of the patterns; the least chosen [C]: a covariance is not to
+be chosen by details of a tenth of the heights."""
+LARGEST_PATTERNS = 12
+"""Patterns that tell s² by themselves; chosen [C]: as many as terms of second, third and fourth order."""
 COUNTS = 0.01
 """Probability below which a covariance is left out."""
 
 Covariance = Callable[[np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class _Model:
-    """A covariance and how probable it is.
-
-    Parameters
-    ----------
-    level : s², m². alone : τ, over the level. system : factors of the system above, solved : (k + 3,) of the heights.
-    """
+    """A covariance, how probable it is, and its level s², m²."""
 
     probability: float
     covariance: Covariance
     level: float
-    alone: float
-    system: tuple[np.ndarray, np.ndarray]
-    solved: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class GroundAround:
     """The ground around a boundary.
 
     Parameters
     ----------
-    places : (k, 2), from the middle, over the size. middle : (2,) m. size : m, root of the boundary's area.
-    height : m, that heights count from. models : the covariances that are probable.
+    size : m, root of the boundary's area. models : the covariances that are probable; none where it is a plane.
     """
 
-    places: np.ndarray
-    middle: np.ndarray
     size: float
-    height: float
     models: tuple[_Model, ...]
 
-    def left_out(self, places: np.ndarray, weight: np.ndarray, of_base: float) -> tuple[float, float]:
-        """What a base is above the ground: expected m³, and the mean square m⁶; over a plane nothing.
-
-        Parameters
-        ----------
-        places : (q, 2) m. weight : (q,) m², what they stand for. of_base : m³, integral of the base over them.
-        """
-        at = (places - self.middle) / self.size
-        if not self.models:
-            return 0.0, 0.0
-        far, own = cdist(self.places, at), cdist(at, at)
-        more = of_base - self.height * float(weight.sum())
-        expected, square, total = 0.0, 0.0, 0.0
-        for model in self.models:
-            side = np.concatenate([model.covariance(far) @ weight, weight @ _plane(at)])
-            off = more - float(side @ model.solved)
-            variance = float(weight @ model.covariance(own) @ weight - side @ lu_solve(model.system, side))
-            expected += model.probability * off
-            square += model.probability * (off**2 + model.level * max(variance, 0.0))
-            total += model.probability
-        return expected / total, square / total
+    def contrast_variance(self, xy: np.ndarray, weights: np.ndarray) -> float:
+        """Variance of Σλz at places (n, 2) m with weights (n,) that no plane moves; m⁶ where these are m²."""
+        distance = cdist(xy, xy) / self.size
+        total = sum(model.probability for model in self.models)
+        of_each = (
+            model.probability * model.level * float(weights @ model.covariance(distance) @ weights)
+            for model in self.models
+        )
+        return max(sum(of_each), 0.0) / total if self.models else 0.0
 
 
 _KNOWN: WeakKeyDictionary[SplineBase, GroundAround | None] = WeakKeyDictionary()
@@ -120,19 +95,12 @@ _KNOWN: WeakKeyDictionary[SplineBase, GroundAround | None] = WeakKeyDictionary()
 def ground_around(base: SplineBase, boundary: Boundary, surface: Surface) -> GroundAround | None:
     """The ground around the boundary of a base, found once for it; None where too little of it is known."""
     if base not in _KNOWN:
-        _KNOWN[base] = _found(base, boundary, surface)
+        xyz = _heights_around(boundary, surface, RING_FROM)
+        if len(xyz) < ENOUGH:
+            xyz = _heights_around(boundary, surface, 0.0)
+        size = float(np.sqrt(boundary.area))
+        _KNOWN[base] = GroundAround(size, _probable(xyz / size, xyz[:, 2])) if len(xyz) >= ENOUGH else None
     return _KNOWN[base]
-
-
-def _found(base: SplineBase, boundary: Boundary, surface: Surface) -> GroundAround | None:
-    xyz = _heights_around(boundary, surface)
-    if len(xyz) < ENOUGH:
-        return None
-    along = np.unique(np.linspace(0, len(base.xy) - 1, PLACES_ALONG).astype(int))
-    xyz = np.concatenate([xyz, np.column_stack([base.xy, base.z])[along]])
-    size, middle, height = float(np.sqrt(boundary.area)), xyz[:, :2].mean(axis=0), float(xyz[:, 2].mean())
-    places = (xyz[:, :2] - middle) / size
-    return GroundAround(places, middle, size, height, _probable(places, xyz[:, 2] - height))
 
 
 def covariances() -> Iterator[Covariance]:
@@ -166,44 +134,42 @@ def _rolling(distance: np.ndarray, wave: float, length: float) -> np.ndarray:
     return j0(2.0 * np.pi * distance / wave) * _smooth(distance, length)
 
 
-def _plane(places: np.ndarray) -> np.ndarray:
-    """(n, 3)."""
-    return np.column_stack([np.ones(len(places)), places])
-
-
-def _probable(places: np.ndarray, z: np.ndarray) -> tuple[_Model, ...]:
-    """The covariances that heights (k,) m at places (k, 2) make probable."""
-    distance, plane = cdist(places, places), _plane(places)
-    left = np.linalg.qr(plane, mode="complete").Q[:, 3:]
-    contrasts = left.T @ z
+def _probable(xyz: np.ndarray, z: np.ndarray) -> tuple[_Model, ...]:
+    """The covariances that heights z (k,) m at places (k, 2 or more), over the size, make probable."""
+    places = xyz[:, :2] - xyz[:, :2].mean(axis=0)
+    distance = cdist(places, places)
+    left = np.linalg.qr(np.column_stack([np.ones(len(z)), places]), mode="complete").Q[:, 3:]
+    contrasts = left.T @ (z - z.mean())
     if not contrasts @ contrasts > 0.0:
         return ()
-    found: list[tuple[float, Covariance, float, float]] = []
+    found: list[tuple[float, Covariance, float]] = []
     for covariance in covariances():
         power, patterns = np.linalg.eigh(left.T @ covariance(distance) @ left)
-        power, squares = np.maximum(power, 0.0), (patterns.T @ contrasts) ** 2
+        power, squares = np.maximum(power[::-1], 0.0), ((patterns.T @ contrasts) ** 2)[::-1]
         for alone in ROUGH_WITHIN * power.mean():
-            level = float(np.mean(squares / (power + alone)))
-            likelihood = -0.5 * (len(squares) * np.log(level) + float(np.log(power + alone).sum()))
-            found.append((likelihood, covariance, level, float(alone)))
+            ratio = squares / (power + alone)
+            level = float(ratio.mean())
+            likelihood = -0.5 * (len(ratio) * np.log(level) + float(np.log(power + alone).sum()))
+            found.append((likelihood, covariance, max(level, float(ratio[:LARGEST_PATTERNS].mean()))))
     share = np.exp(np.array([one[0] for one in found]) - max(one[0] for one in found))
     share /= share.sum()
-    models: list[_Model] = []
-    for p, (_, covariance, level, alone) in zip(share, found, strict=True):
-        if p >= COUNTS:
-            system = np.zeros((len(z) + 3, len(z) + 3))
-            system[: len(z), : len(z)] = covariance(distance) + alone * np.eye(len(z))
-            system[: len(z), len(z) :], system[len(z) :, : len(z)] = plane, plane.T
-            factors = lu_factor(system)
-            solved = lu_solve(factors, np.concatenate([z, np.zeros(3)]))
-            models.append(_Model(float(p), covariance, level, alone, factors, solved))
-    return tuple(models)
+    return tuple(
+        _Model(float(p), covariance, level)
+        for p, (_, covariance, level) in zip(share, found, strict=True)
+        if p >= COUNTS
+    )
 
 
-def _heights_around(boundary: Boundary, surface: Surface) -> np.ndarray:
-    """(n, 3) m, heights of cells drawn from the ring around the boundary, without what is measured beside it."""
+def _heights_around(boundary: Boundary, surface: Surface, start: float) -> np.ndarray:
+    """(n, 3) m, heights of cells drawn from the ring around the boundary, without what is measured beside it.
+
+    Parameters
+    ----------
+    start : inner edge of the ring, as `RING_FROM`.
+    """
     outline = boundary.outline
-    ring = shapely.difference(outline.buffer(RING_SHARE * np.sqrt(boundary.area)), outline)
+    size = np.sqrt(boundary.area)
+    ring = shapely.difference(outline.buffer(RING_TO * size), outline.buffer(start * size))
     if boundary.beside is not None:
         ring = shapely.difference(ring, boundary.beside)
     ring = shapely.intersection(ring, shapely.box(*surface.grid.bounds))
@@ -223,13 +189,13 @@ def _cells_of(ring: BaseGeometry, grid: Grid) -> np.ndarray:
     left, bottom, right, top = ring.bounds
     rng, found = np.random.default_rng(0), np.zeros((0, 2))
     shapely.prepare(ring)
-    tries = int(np.ceil(2.0 * PLACES_AROUND * (right - left) * (top - bottom) / max(ring.area, 1e-300)))
+    tries = int(np.ceil(2.0 * PLACES * (right - left) * (top - bottom) / max(ring.area, 1e-300)))
     for _ in range(4):
         xy = rng.uniform((left, bottom), (right, top), (min(tries, 200_000), 2))
         row, column = np.rint(grid.row(xy[:, 1])), np.rint(grid.column(xy[:, 0]))
         xy = np.column_stack([grid.x(column), grid.y(row)])
         found = np.concatenate([found, xy[np.asarray(shapely.contains_xy(ring, xy[:, 0], xy[:, 1]))]])
         found = found[np.sort(np.unique(found, axis=0, return_index=True)[1])]
-        if len(found) >= PLACES_AROUND:
+        if len(found) >= PLACES:
             break
-    return found[:PLACES_AROUND]
+    return found[:PLACES]
