@@ -27,10 +27,11 @@ def _weights(t):
 
 
 @kernel
-def resample(pixels, x, y, known, out):
+def resample(pixels, first, x, y, known, out):
     """Grey values at places, column x and row y of pixel centres; at the edge its pixels go on. Unknown ones are 0.
 
-    pixels : (·, ·). x, y, known, out : (rows, columns); x, y and out of float32.
+    pixels : (·, ·) float32, of a photograph from column and row `first` on, two more about all places; bytes would be
+    turned to floats sixteen times each. x, y, known, out : (rows, columns); x, y and out of float32.
     """
     last_row, last_column = pixels.shape[0] - 1, pixels.shape[1] - 1
     for i in range(out.shape[0]):
@@ -39,7 +40,7 @@ def resample(pixels, x, y, known, out):
             if not known[i, j]:
                 continue
             left, above = np.floor(x[i, j]), np.floor(y[i, j])
-            column, row = int(left), int(above)
+            column, row = int(left) - first[0], int(above) - first[1]
             a, b, c, d = _weights(x[i, j] - left)
             across = _weights(y[i, j] - above)
             total = np.float32(0.0)
