@@ -47,7 +47,7 @@ def run_dsm(
 
 def outcome_lines(found: DenseSurface, target: Path) -> list[str]:
     """What the user reads of the surface."""
-    return [*_summary(found.summary), f"Written to {target}"]
+    return [*(f"note: {note}" for note in found.notes), *_summary(found.summary), f"Written to {target}"]
 
 
 def _summary(content: dict[str, Any]) -> list[str]:

@@ -47,6 +47,7 @@ class DenseSurface:
     ground : the ground without objects, None where it was not asked for.
     keeper : what removes the tiles when nobody uses them any more; None where they stay.
     head : of files. settings : every argument that was used, as dsm.json has them.
+    notes : what σ lacks, in sentences.
     """
 
     record: DenseOutcome
@@ -57,6 +58,7 @@ class DenseSurface:
     keeper: Spool | None = None
     head: Head = field(default_factory=Head)
     settings: list[dict[str, Any]] = field(default_factory=list)
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def surface(self) -> Surface:
@@ -98,7 +100,8 @@ class DenseSurface:
         from aerotri.formats.results.dense import dense_json
 
         found = dense_json(self.record, self.block, self.crs, self.ground)
-        return self.head.as_dict() | found | {"adjustment": self.adjustment, "settings": self.settings}
+        stated = {"adjustment": self.adjustment, "notes": list(self.notes), "settings": self.settings}
+        return self.head.as_dict() | found | stated
 
     @property
     def plot(self) -> DensePlots:
@@ -225,6 +228,7 @@ def _measured(
 ) -> DenseSurface:  # fmt: skip
     from aerotri.execution.opening import opened
     from aerotri.formats.files.spool import Spool
+    from aerotri.statistics.camera_field import missing_in_sigma
     from aerotri.terrain.dense.bare_ground import bare_ground
     from aerotri.terrain.dense.measure import DensePlan, measure_surface
     from aerotri.terrain.dtm import chosen_rows
@@ -248,7 +252,9 @@ def _measured(
     ground = bare_ground(outcome, settings.widest_object) if settings.ground else None
     block = record.result.block
     used = used_settings(dense_surface, settings, {"resolution": "m", "area": "m", "widest_object": "m"})
-    return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper, Head(block.project, block.crs), used)
+    head, missing = Head(block.project, block.crs), missing_in_sigma(record)
+    notes = (missing,) if missing else ()
+    return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper, head, used, notes)
 
 
 def _surface_parts(o: DenseOutcome) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:

@@ -90,7 +90,8 @@ class Orthophoto:
     Parameters
     ----------
     folder : with ortho.tif and what belongs to it. summary : the content of ortho.json.
-    record : the numbers as arrays. points : control and check points in it. notes : on the input, in sentences.
+    record : the numbers as arrays. points : control and check points in it. notes : on the input
+        and on what σ lacks, in sentences.
     """
 
     folder: Path
@@ -221,6 +222,7 @@ def _made(
 ) -> Orthophoto:  # fmt: skip
     from aerotri.formats.files.atomic import atomic_folder, room_beside
     from aerotri.rasters.grids import cache_limited
+    from aerotri.statistics.camera_field import missing_in_sigma
     from aerotri.terrain.ortho.make import CACHE_BYTES, make_orthophoto
 
     in_threads = chosen(executor).kind == "threads"
@@ -238,8 +240,9 @@ def _made(
         workers = None if in_threads else stack.enter_context(opened(executor, report.said))
         room = tiles if in_threads or tiles is not None else stack.enter_context(room_beside(out))
         made = make_orthophoto(record, taken, heights, sigma, settings, folder, report.stage, room, workers)
-        notes += _blurred(made.blur, taken[1])
-        outcome, summary, points = _described(record, made, ground.label, settings, folder)
+        missing = missing_in_sigma(record)
+        notes += _blurred(made.blur, taken[1]) + ((missing,) if missing else ())
+        outcome, summary, points = _described(record, made, ground.label, settings, folder, notes)
         if plots:
             from aerotri.report.plots.rendering import save_plots
 
@@ -250,7 +253,7 @@ def _made(
 
 
 def _described(
-    record: Record, outcome: OrthoOutcome, name: str, settings: OrthoSettings, folder: Path
+    record: Record, outcome: OrthoOutcome, name: str, settings: OrthoSettings, folder: Path, notes: tuple[str, ...]
 ) -> tuple[OrthoOutcome, dict[str, Any], tuple[Any, ...]]:
     """Write seams and record beside the image."""
     from aerotri.formats.results.json_text import write_json
@@ -260,6 +263,7 @@ def _described(
     block = record.result.block
     write_seams(folder / SEAMS, outcome, horizontal_crs(block.crs))
     summary = Head(block.project, block.crs).as_dict() | ortho_json(outcome, block, name, settings.resampling)
+    summary["notes"] = list(notes)
     summary["settings"] = used_settings(orthophoto, settings, {"cell": "m", "area": "m"})
     write_json(folder / RECORD, summary)
     return outcome, summary, tuple(marked_points(outcome, block))

@@ -78,7 +78,7 @@ class TerrainModel:
     record : the numbers as arrays.
     block : name of the block. crs : its coordinate system.
     adjustment : key of the adjustment it was measured with.
-    notes : what was done with the input before, in sentences.
+    notes : what was done with the input before and what σ lacks, in sentences.
     ground_within : name of the outline within which all is ground; '' where there is none.
     head : of files. settings : every argument that was used, as dtm.json has them.
     """
@@ -133,7 +133,8 @@ class TerrainModel:
         from aerotri.formats.results.terrain import terrain_json
 
         stated = {"adjustment": self.adjustment, "ground_within": self.ground_within, "settings": self.settings}
-        return self.head.as_dict() | terrain_json(self.record, self.block, self.crs) | stated
+        found = terrain_json(self.record, self.block, self.crs)
+        return self.head.as_dict() | found | stated | {"notes": list(self.notes)}
 
     @property
     def plot(self) -> TerrainPlots:
@@ -294,6 +295,7 @@ def measure_terrain(
     from aerotri.execution.opening import opened
     from aerotri.execution.work import Workplace
     from aerotri.formats.files.spool import Spool
+    from aerotri.statistics.camera_field import missing_in_sigma
     from aerotri.terrain.dtm import make_terrain_model
     from aerotri.volume.shared import adjustment_key
 
@@ -310,6 +312,8 @@ def measure_terrain(
             notes = (*notes, outline.note) if outline.note else notes
         with opened(executor, report.said) as workers:
             outcome = make_terrain_model(record, plan, report.stage, Workplace(workers, spool.folder))
+    missing = missing_in_sigma(record)
+    notes = (*notes, missing) if missing else notes
     head = Head(block.project, block.crs)
     used = used_settings(terrain, settings, {"interval": "m", "cell": "m", "area": "m", "window": "px"})
     return TerrainModel(outcome, str(block.name), block.crs, adjustment_key(record), notes, name, head, used)

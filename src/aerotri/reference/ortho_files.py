@@ -82,6 +82,7 @@ ORTHO_JSON = (
     Item("photographs[].area_m2", "number", "Area taken from it.", "m²"),
     Item("photographs[].gain[]", "number", "Factor of its colours, by band."),
     Item("photographs[].offset[]", "number", "Added to its colours, by band, share of white."),
+    Item("notes[]", "text", "What was done with the input, and what σ lacks, in sentences."),
     *ARGUMENTS,
 )
 

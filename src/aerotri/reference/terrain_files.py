@@ -63,6 +63,7 @@ DTM_JSON = (
     Item("ground_share", "number", "Share of the points that are ground, not objects."),
     Item("ground_within", "text", "Outline within which all is ground; empty where none was given."),
     Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
+    Item("notes[]", "text", "What was done with the input, and what σ lacks, in sentences."),
     *ARGUMENTS,
 )
 DSM_JSON = (
@@ -112,6 +113,7 @@ DSM_JSON = (
     Item("ground.bridge.power", "number", "Power by which it grows with the distance."),
     Item("ground.bridge.discs", "whole", "Discs of ground that were taken out, bridged and compared to find it."),
     Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
+    Item("notes[]", "text", "What was done with the input, and what σ lacks, in sentences."),
     *ARGUMENTS,
 )
 DIFFERENCE = (

@@ -35,10 +35,11 @@ def _spline_weights(t):
 
 
 @kernel
-def resample(pixels, x, y, known, out):
+def resample(pixels, first, x, y, known, out):
     """Grey values at places, column x and row y of pixel centres; at the edge its pixels go on. Unknown ones are 0.
 
-    pixels : (·, ·) coefficients of a spline surface. x, y, known, out : (rows, columns); x, y and out of float32.
+    pixels : (·, ·) float32, coefficients of a spline surface through a photograph, from its column and row `first` on,
+    two more about all places. x, y, known, out : (rows, columns); x, y and out of float32.
     """
     last_row, last_column = pixels.shape[0] - 1, pixels.shape[1] - 1
     for i in range(out.shape[0]):
@@ -47,7 +48,7 @@ def resample(pixels, x, y, known, out):
             if not known[i, j]:
                 continue
             left, above = np.floor(x[i, j]), np.floor(y[i, j])
-            column, row = int(left), int(above)
+            column, row = int(left) - first[0], int(above) - first[1]
             a, b, c, d = _spline_weights(x[i, j] - left)
             across = _spline_weights(y[i, j] - above)
             total = np.float32(0.0)
