@@ -6,7 +6,7 @@ the σ of a cell and do not average out as noise does.
 
 from __future__ import annotations
 
-LASTING_PX, LASTING_LENGTH_PX = 0.0035, 50.0
+LASTING_PX, LASTING_LENGTH_PX = 0.0005, 50.0
 """RMS, pixels of parallax, and distance, pixels on the ground, over which their correlation falls to 1/e; chosen [C]:
 what makes the errors of means over squares of 10 to 80 cells of rendered scenes most likely, two draws of eight scenes
 with little noise, and holds on two others (tools/prove/dense_surface.py)."""
