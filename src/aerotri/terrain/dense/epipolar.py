@@ -233,15 +233,17 @@ def _resampled(
     within(x, y, (edge[0] + 1.0, edge[1] + 1.0), last, known)
     out = np.zeros((rows, columns), np.float32)
     if known.any():
-        (left, right), (above, below) = (_reached(place_of[:, :, axis][known], pixels.shape[1 - axis]) for axis in (0, 1))
+        left, right = _reached(x, known, pixels.shape[1])
+        above, below = _reached(y, known, pixels.shape[0])
         coefficients = spline.of_surface(pixels[above:below, left:right])
         resample(coefficients, x - np.float32(left), y - np.float32(above), known, out)
     return out, known
 
 
-def _reached(at: np.ndarray, count: int) -> tuple[int, int]:
-    """First row or column of pixels, and the one after the last, that splines at such places are made of."""
-    return max(int(at.min()) - spline.REACH - 1, 0), min(int(at.max()) + spline.REACH + 3, count)
+def _reached(at: np.ndarray, known: np.ndarray, count: int) -> tuple[int, int]:
+    """First row or column of pixels, and the one after the last, that splines at the known places are made of."""
+    low, high, *_ = cv2.minMaxLoc(at, known.view(np.uint8))
+    return max(int(low) - spline.REACH - 1, 0), min(int(high) + spline.REACH + 3, count)
 
 
 def _mean_depth(g: EpipolarGeometry) -> float:

@@ -18,7 +18,7 @@ def _weights() -> np.ndarray:
     """(2·`REACH` + 1,) of the pixels around; exact for polynomials of third order, as all of them would be."""
     k = np.arange(-REACH, REACH + 1)
     out = np.sqrt(3.0) * (np.sqrt(3.0) - 2.0) ** np.abs(k)
-    out[np.abs(k) == 1] += 0.5 * (-1.0 / 3.0 - k**2 @ out)
+    out[np.abs(k) == REACH] += 0.5 * (-1.0 / 3.0 - k**2 @ out) / REACH**2
     out[k == 0] += 1.0 - out.sum()
     return out
 
