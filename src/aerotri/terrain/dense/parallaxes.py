@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from aerotri.terrain.dense import spline
 from aerotri.terrain.dense._refinement_kernels import HALF, keep_seen, shift_windows
 from aerotri.terrain.dense._resampling_kernels import align, move_rows
 from aerotri.terrain.dense._smoothing_kernels import smooth
@@ -38,6 +39,10 @@ SMOOTHED_STEP_PX, SMOOTHED_PX = 0.7, 2.5
 """σ of the weights by which parallaxes are smoothed, in parallax and in place; chosen [C]."""
 ROUNDS = 2
 """Of least squares; a third moves the medians of synthetic pairs by less than .01 px."""
+SHARE_OF_SHIFT = 0.85
+"""Of the shift of a window that is taken; chosen [C]: differences of pixels two apart see a wave number ω with
+sin ω / ω of its slope [D], so that shifts come out a fifth too large for the texture of rendered photographs. A third
+round would do as well and take longer; smoother texture asks for less and loses a fiftieth in two rounds."""
 LARGEST_SHIFT_PX = 1.5
 """By which least squares may move a parallax of the semi-global matching; chosen [C]: that is within a pixel of it, and
 half of one on noise."""
@@ -54,7 +59,7 @@ but over a square of fine noise the mean stays below .42 in all but a thousandth
 ALONE_POWER, LEAST_SHARE = 2.0, 0.1
 """Power of the share of its window that matches by which σ of a pixel is divided, and the least share; chosen [C]: so
 errors at the rim of glass, of water and of photographs are within σ (tools/prove/dense_surface.py)."""
-LEAST_SIGMA_PX = 0.02
+LEAST_SIGMA_PX = 0.01
 """σ of a parallax is never stated smaller; chosen [C]: interpolation between pixels leaves that even without noise."""
 LARGEST_SIGMA_PX = 1.0
 """σ of a parallax at which nothing is known."""
@@ -122,7 +127,7 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
         if slow.any():
             move_rows(images.right, slow, images.geometry.lowest + 0.5 * images.geometry.count, moved)
             right = moved
-        align(right, value, known, left, aligned)
+        align(spline.along_rows(right), value, known, left, aligned)
         level = np.float32(aligned.mean())
         shift_windows(left, aligned, level, known, shift, across, variance, of_across, correlation)
         for rows in _bands(len(value)):
@@ -154,6 +159,7 @@ def _bands(rows: int) -> list[slice]:
 def _move(value: np.ndarray, shift: np.ndarray, known: np.ndarray, room: np.ndarray) -> None:
     """Parallaxes by their shifts; those that move too far are known no more."""
     known &= np.abs(shift, out=room) < LARGEST_SHIFT_PX
+    shift *= np.float32(SHARE_OF_SHIFT)
     value += shift
     np.copyto(value, INVALID, where=~known)
 
