@@ -114,7 +114,12 @@ def volume(
     ] = SIGMA.matching_window_m,
     base_sigma: Annotated[
         float,
-        typer.Option(min=0.0, help="σ of the base's height, m, common to all of it.", rich_help_panel=SIGMAS),
+        typer.Option(
+            min=0.0,
+            help="σ of the base's height, m, common to all of it; for a spline through the boundary in place of what "
+            "the ground around tells.",
+            rich_help_panel=SIGMAS,
+        ),
     ] = SIGMA.base_sigma,
     boundary_sigma: BoundarySigma = SIGMA.boundary_sigma,
     boundary_from: BoundaryOrigin = SIGMA.boundary_from,

@@ -101,7 +101,8 @@ def volume(
     matching_sigma_um : µm, σ of an image coordinate of a picket; that of the adjustment where None.
     matching_window : m, side of the matching window on the ground; its cells share noise. None: the noise length of a
         dense surface, 0 of others.
-    base_sigma : m, σ of the height of the base, common to all of it.
+    base_sigma : m, σ of the height of the base, common to all of it; it takes the place of what the ground around a
+        spline through the boundary says.
     boundary_sigma : m, σ of either coordinate of a corner of the boundary.
     boundary_from : 'survey', where the boundary is known in space, as from a plan or measured on the ground; 'product',
         where it was drawn on the surface or the orthophoto of the same adjustment: it moves with them.
