@@ -272,11 +272,11 @@ STABLE_PART = 0.999
 
 
 def _boundary_of(stated: BaseGeometry | FilePath, epsg: int | None) -> Boundary:
-    from aerotri.volume.boundary import boundary_of, read_boundary
+    from aerotri.volume.boundary import boundary_of_parts, read_boundary
 
     if isinstance(stated, str | os.PathLike):
         return read_boundary(os.fspath(stated), epsg)
-    return boundary_of(stated, "the polygon given")
+    return boundary_of_parts(stated, "the polygon given")
 
 
 def _areas(

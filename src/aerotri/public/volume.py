@@ -85,7 +85,7 @@ def volume(
     surface : raster of heights; or what `aerotri.terrain` returned, or the folder it was written to, whose pickets
         are used for σ; or what `aerotri.dense_surface` returned, or its folder: σ and noise length of its cells count.
     boundary : GeoPackage, GeoJSON or WKT file, WKT text, a shapely polygon, or polygons by their names; the whole
-        surface where None. Several polygons are piles: each is measured by itself, with a base of its own, and their
+        surface where None. Several polygons, and the parts of one feature, are piles: each is measured by itself, with a base of its own, and their
         sum has a σ that knows what they share.
     layer : which surface of these: 'dsm' with objects (a pile is one), or 'dtm', the ground alone.
     base : height in m, 'level:H', 'plane:X,Y,Z;X,Y,Z;X,Y,Z', 'plane' (fitted to the boundary), 'boundary' (spline
@@ -333,12 +333,12 @@ def _piles(asked: _Asked, base: Base | None, reader: Reader, boundary: Boundary)
 def _boundary(stated: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | None, reader: Reader) -> Boundary:
     from shapely.geometry.base import BaseGeometry
 
-    from aerotri.volume.boundary import boundary_of, boundary_of_grid, boundary_of_piles, read_boundary
+    from aerotri.volume.boundary import boundary_of_grid, boundary_of_parts, boundary_of_piles, read_boundary
 
     if stated is None:
         return boundary_of_grid(reader.grid)
     if isinstance(stated, BaseGeometry):
-        return boundary_of(stated, "the polygon given")
+        return boundary_of_parts(stated, "the polygon given")
     if isinstance(stated, Mapping):
         if not stated:
             raise InputError("no polygon is given", "give a polygon for every name")
