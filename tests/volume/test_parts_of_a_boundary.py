@@ -64,7 +64,8 @@ def test_parts_of_a_feature_have_its_name_and_a_number(geometry, tmp_path):
 
 def test_a_single_part_keeps_the_name_of_its_feature(tmp_path):
     found = read_boundary(_geojson(tmp_path / "a.geojson", [shapely.MultiPolygon([HOLED])], ["dump"]), 32632)
-    assert found.piles == () and found.polygon_name == "dump" and found.area == pytest.approx(HOLED.area)
+    assert (found.piles, found.polygon_name) == ((), "dump")
+    assert found.area == pytest.approx(HOLED.area)
 
 
 def test_a_collection_in_a_geopackage(tmp_path):
@@ -102,7 +103,7 @@ def test_a_collection_with_a_line_is_refused():
 
 
 def _ground(rise=0.0):
-    y, x = np.mgrid[0:20, 0:36] + 0.5
+    _, x = np.mgrid[0:20, 0:36] + 0.5
     z = 100.0 + 0.01 * x**2 + rise * (x > 18)
     return aerotri.Surface.of_array(z, left=0.0, top=20.0, cell=1.0, sigma=np.full(z.shape, 0.02))
 

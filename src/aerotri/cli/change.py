@@ -45,7 +45,8 @@ def change(
     area: Annotated[
         str | None,
         typer.Option(
-            help="Where volumes are wanted, as --stable; several polygons, and the parts of one, one by one. Default: all in common.",
+            help="Where volumes are wanted, as --stable; several polygons, and the parts of one, one by one. "
+            "Default: all in common.",
             rich_help_panel=METHOD,
         ),
     ] = None,

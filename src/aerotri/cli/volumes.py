@@ -55,8 +55,8 @@ def volume(
     boundary: Annotated[
         str | None,
         typer.Option(
-            help="GeoPackage, GeoJSON, WKT file or WKT text; several polygons, and the parts of one feature, are piles, "
-            "each with its own base and volume. Default: the whole surface.",
+            help="GeoPackage, GeoJSON, WKT file or WKT text; several polygons, and the parts of one feature, are "
+            "piles, each with its own base and volume. Default: the whole surface.",
             rich_help_panel=SURFACE,
         ),
     ] = None,
