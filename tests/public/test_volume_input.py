@@ -540,3 +540,21 @@ def test_a_surface_in_memory_in_a_system_in_feet_is_saved_in_metres(tmp_path):
     )
     path = surface.save(tmp_path / "surface.tif")
     np.testing.assert_allclose(aerotri.Surface(path).z, 100.0)
+
+
+def test_a_volume_without_an_adjustment_says_why_it_has_no_sigma(cone):
+    plain = aerotri.volume(cone, AROUND)
+    assert [text for text in plain.warnings if text.startswith("no σ: give --adjustment")]
+    stated = aerotri.volume(cone, AROUND, base_sigma=0.1)
+    assert not any(text.startswith("no σ:") for text in stated.warnings)
+
+
+def test_the_origin_of_a_boundary_without_an_adjustment_is_refused(cone, tmp_path):
+    with pytest.raises(InputError, match="boundary_from='product' belongs to an adjustment") as refused:
+        aerotri.volume(cone, AROUND, boundary_from="product")
+    assert "no effect" in refused.value.remedy
+    from aerotri.cli.app import invoke
+
+    path = cone.save(tmp_path / "cone.tif")
+    with pytest.raises(InputError, match="--boundary-from product belongs to --adjustment"):
+        invoke(["volume", str(path), "--boundary-from", "product", "--out", str(tmp_path / "out")])

@@ -140,7 +140,7 @@ def volume(
 
     given = VolumeInput(
         surface, base, boundary, cast(Any, method), adjustment, pickets, base_adjustment, base_pickets,
-        cast(Any, layer), density, density_sigma, project,
+        cast(Any, layer), density, density_sigma, project, cast(Any, boundary_from),
     )  # fmt: skip
     options = SigmaOptions(
         matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma,

@@ -137,6 +137,11 @@ def volume(
         raise InputError(
             f"a boundary from '{boundary_from}' is not known", f"choose one of {', '.join(BOUNDARIES_FROM)}"
         )
+    if adjustment is None and boundary_from != SIGMA.boundary_from:
+        raise InputError(
+            f"boundary_from='{boundary_from}' belongs to an adjustment",
+            "give the adjustment that the surface was measured with: without σ it has no effect",
+        )
     top, below = MeasuredSurface(surface, _stated(adjustment), pickets, layer), None
     if is_surface(base):
         below = MeasuredSurface(base, _stated(base_adjustment), base_pickets, layer)
