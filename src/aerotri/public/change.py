@@ -256,7 +256,8 @@ def change(
     if unsure:
         notes.append(
             f"the stable ground is too level to tell a shift in plan ({', '.join(unsure)}): where both surfaces have "
-            "good positions, --align height moves the second in height alone and leaves a smaller σ"
+            "good positions, --align height moves the second in height alone, which lowers the level of detection on "
+            "slopes"
         )
     summary = change_json(found, names_of(epochs), crs, "" if ground is None else ground.name, align, tuple(notes))
     head = Head(project_of(project, second_adjustment, second, first_adjustment, first), crs)
