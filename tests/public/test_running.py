@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import html
 import json
+import shlex
 
 import pytest
 
 import aerotri
 from aerotri import InputError
 from aerotri.execution.work import TasksFailedError
-from aerotri.public.run_steps import command_line
+from aerotri.public.run_steps import Step, command_line
 from chain_of_fakes import Fakes, ends_of
 
 
@@ -204,3 +206,16 @@ def test_a_step_whose_tasks_failed_is_named_and_others_go_on(fakes, photographs,
     assert ends["volume"] == ("left out", "dtm is missing")
     assert ends["ortho"][0] == "done"
     assert not project.complete
+
+
+def test_command_lines_can_be_copied_with_spaces_in_names(fakes, photographs, tmp_path):
+    """As a shell takes them apart again, on screen and on the page."""
+    out = tmp_path / "my drone project"
+    aerotri.run(photographs, out, dense=False)
+    steps = json.loads((out / "run.json").read_text())["steps"]
+    page = html.unescape((out / "report.html").read_text(encoding="utf-8"))
+    for step in steps:
+        told = Step(step["name"], step["folder"], step["what"], tuple(step["arguments"])).command
+        assert shlex.split(told) == ["aerotri", *step["arguments"]]
+        assert told in page
+    assert f"'{out}/result'" in page

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -137,7 +138,7 @@ def _step(step: dict[str, Any], folder: Path, shown: set[Path]) -> dict[str, Any
     return {
         **step,
         "reason": printable(step["reason"], 1000),
-        "command": printable("aerotri " + " ".join(step["arguments"]), 1000),
+        "command": printable(shlex.join(("aerotri", *step["arguments"])), 1000),
         "figures": _figures(folder) if done else [],
         "page": page,
         "file": f"{step['folder']}/{pages[0].name}" if pages else "",
