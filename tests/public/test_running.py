@@ -217,5 +217,6 @@ def test_command_lines_can_be_copied_with_spaces_in_names(fakes, photographs, tm
     for step in steps:
         told = Step(step["name"], step["folder"], step["what"], tuple(step["arguments"])).command
         assert shlex.split(told) == ["aerotri", *step["arguments"]]
-        assert told in page
-    assert f"'{out}/result'" in page
+        if step["status"] == "done":
+            assert told in page
+    assert f"'{out / 'result'}'" in page

@@ -291,3 +291,25 @@ def test_no_sigma_is_refused(wrong, stable):
     second = aerotri.Surface.of_array(second.z, left=0.0, top=SIDE, cell=1.0, sigma=sigma, name="june")
     with pytest.raises(InputError, match=r"june.*2 cells with a height have a σ of zero or less"):
         aerotri.change(first, second, stable=stable, align="none", area=AREA)
+
+
+def test_a_surface_and_a_cloud_are_refused_as_that(tmp_path):
+    from aerotri.cli.app import invoke
+
+    for first, second in (("a.tif", "b.laz"), ("b.laz", "a.tif")):
+        with pytest.raises(aerotri.InputError, match="a.tif is a surface and b.laz a point cloud"):
+            invoke(["change", first, second])
+
+
+def test_surfaces_and_stable_ground_apart_are_told_by_place():
+    flat = np.full((30, 30), 100.0)
+    first, second, far = (
+        aerotri.Surface.of_array(flat, left=left, top=530.0, cell=1.0, sigma=np.full(flat.shape, 0.02))
+        for left in (500.0, 505.0, 900.0)
+    )
+    with pytest.raises(aerotri.InputError, match="X 500 to 530, Y 500 to 530.* lies at X 900 to 930"):
+        aerotri.change(first, far)
+    beside = "POLYGON ((700 700, 720 700, 720 720, 700 720, 700 700))"
+    with pytest.raises(aerotri.InputError, match="no cell that both surfaces have: it lies at X 700 to 720") as refused:
+        aerotri.change(first, second, stable=beside)
+    assert "inside both surfaces" in refused.value.remedy

@@ -558,3 +558,16 @@ def test_the_origin_of_a_boundary_without_an_adjustment_is_refused(cone, tmp_pat
     path = cone.save(tmp_path / "cone.tif")
     with pytest.raises(InputError, match="--boundary-from product belongs to --adjustment"):
         invoke(["volume", str(path), "--boundary-from", "product", "--out", str(tmp_path / "out")])
+
+
+def test_a_folder_without_a_surface_is_told_as_that(tmp_path):
+    with pytest.raises(InputError, match="holds no surface: there is no dsm.tif") as refused:
+        aerotri.volume(tmp_path)
+    assert "the folder that dsm or dtm wrote" in refused.value.remedy
+
+
+def test_a_file_without_a_coordinate_system_is_told(cone, tmp_path):
+    path = aerotri.Surface.of_array(cone.z, left=LEFT, top=TOP, cell=1.0).save(tmp_path / "site.tif")
+    said = "site.tif does not say its coordinate system"
+    assert any(said in text for text in aerotri.volume(path).warnings)
+    assert not any("does not say its" in text for text in aerotri.volume(cone, AROUND).warnings)

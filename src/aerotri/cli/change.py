@@ -119,6 +119,12 @@ def change(
             first, second, sizes, stable, (first_adjustment, second_adjustment), project, out, plots, json_
         )
         return
+    if is_cloud(first) or is_cloud(second):
+        surface, cloud = (second, first) if is_cloud(first) else (first, second)
+        raise InputError(
+            f"{surface} is a surface and {cloud} a point cloud",
+            "give two of a kind: both surfaces, or both clouds (dsm writes dsm.tif and dsm.laz)",
+        )
     given = [f"--{name}" for name, value in sizes.items() if value is not None]
     if given:
         raise InputError(f"{', '.join(given)}: of point clouds, and surfaces were given", "give two LAS or LAZ files")

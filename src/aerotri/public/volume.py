@@ -15,6 +15,7 @@ from aerotri.formats.files.spool import Spool
 from aerotri.observations.project import Project
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.ground_of_block import off_the_ground
+from aerotri.public.places import place_in_words
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.projects import project_of
 from aerotri.public.stated import StatedAdjustment
@@ -263,7 +264,8 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     ]
     content["settings"] = asked.settings
     outlines = outline_notes(boundary, min(reader.grid.cell_x, reader.grid.cell_y)) if _follows(asked.base) else ()
-    crs_notes = (reader.note, *(other.note for other in others), *systems, boundary.note, *outlines)
+    silent = "" if any(other.crs_code for other in others) else _without_crs(top, reader)
+    crs_notes = (reader.note, silent, *(other.note for other in others), *systems, boundary.note, *outlines)
     content["warnings"] = [*(text for text in crs_notes if text), *content["warnings"]]
     profiles = chosen_profiles(reader, base, boundary, volumes.sections)
     return MeasuredVolume(volumes, boundary, content, thickness, profiles, spool, notes, head)
@@ -281,6 +283,13 @@ def _stated_alone(
         return [], stated_sigma(reader, base, boundary, asked.options)
     each = [stated_sigma(reader, one.base, one.boundary, asked.options) for one in piles]
     return each, stated_sum(each)
+
+
+def _without_crs(top: MeasuredSurface, reader: Reader) -> str:
+    """What is taken for granted of a file that says no CRS, where no adjustment says that the block is local; or ''."""
+    if top.surface.path is None or top.adjustment is not None or reader.crs_code:
+        return ""
+    return f"{reader.path.name} does not say its coordinate system; X, Y and heights are taken for metres"
 
 
 def _follows(base: SurfaceLike | float) -> bool:
@@ -305,15 +314,9 @@ def _refuse_apart(boundary: Boundary, reader: Reader) -> None:
             where = f" ({reader.crs_code})" if reader.crs_code else ""
             note = f"; {boundary.note}" if boundary.note else ""
             raise InputError(
-                f"'{name}' does not meet the surface: it lies at {_place(polygon.bounds)}, the surface{where} at "
-                f"{_place(edges)}{note}", "check the CRS of both", reader.path,
+                f"'{name}' does not meet the surface: it lies at {place_in_words(polygon.bounds)}, the surface{where} at "
+                f"{place_in_words(edges)}{note}", "check the CRS of both", reader.path,
             )  # fmt: skip
-
-
-def _place(bounds: tuple[float, float, float, float]) -> str:
-    left, bottom, right, top = bounds
-    digits = 6 if max(abs(v) for v in bounds) <= 360.0 else 0
-    return f"X {left:.{digits}f} to {right:.{digits}f}, Y {bottom:.{digits}f} to {top:.{digits}f}"
 
 
 def _piles(asked: _Asked, base: Base | None, reader: Reader, boundary: Boundary) -> list[Pile]:
