@@ -233,9 +233,9 @@ def test_photographs_of_the_block_that_were_not_given_are_named(made, tmp_path):
     assert len(missing) == 1
     assert missing[0] in names[2]
     assert missing[0] in printed
-    assert content["warnings"][0].startswith(said)
+    assert content["notes"][0].startswith(said)
     whole = json.loads((here / "dsm" / "dsm.json").read_text(encoding="utf-8"))
-    assert (whole["photographs_missing"], whole["warnings"]) == ([], [])
+    assert (whole["photographs_missing"], whole["notes"]) == ([], [])
     printed = run("dtm", here / "result", tmp_path / "some", "--out", tmp_path / "dtm", "--no-plots",
                   "--interval", 20)  # fmt: skip
     assert f"note: {said}" in printed
@@ -256,7 +256,7 @@ def _middle(here):
 def test_an_area_beside_the_photographs_and_cells_larger_than_the_ground_are_refused(made, tmp_path):
     here, _ = made
     photographs = here / "block" / "photographs"
-    with pytest.raises(InputError, match="the area does not meet the photographs: they show X -?[0-9]+ to") as refused:
+    with pytest.raises(InputError, match=r"the area does not meet the photographs: they show X -?[0-9]+ to") as refused:
         aerotri.dense_surface(here / "result", photographs, area=(9e5, 9e5, 9.1e5, 9.1e5))
     assert "coordinates of the block" in refused.value.remedy
     with pytest.raises(InputError, match="a cell of 9000 m is larger than the ground") as refused:

@@ -297,7 +297,7 @@ def test_a_document_of_another_result_is_not_replaced(tmp_path):
     out = tmp_path / "documents"
     aerotri.export(first, out, to="pdf")
     kept = (out / "change.pdf").read_bytes()
-    with pytest.raises(InputError, match="is the document of another result, .*first") as refused:
+    with pytest.raises(InputError, match=r"is the document of another result, .*first") as refused:
         aerotri.export(second, out, to="pdf")
     assert "another folder" in refused.value.remedy
     assert (out / "change.pdf").read_bytes() == kept
@@ -305,5 +305,5 @@ def test_a_document_of_another_result_is_not_replaced(tmp_path):
     assert (out / "change.pdf").read_bytes() != kept
     (out / "change.pdf").unlink()
     aerotri.export(second, out, to="pdf")
-    with pytest.raises(InputError, match="another result, .*second"):
+    with pytest.raises(InputError, match=r"another result, .*second"):
         aerotri.export(first, out, to="pdf")

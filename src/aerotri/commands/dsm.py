@@ -53,8 +53,9 @@ def outcome_lines(found: DenseSurface, target: Path) -> list[str]:
 
 def _summary(content: dict[str, Any]) -> list[str]:
     c = content
+    pairs = counted(c["pairs"], "pair")
     lines = [
-        f"{c['photographs']} photographs in {counted(c['pairs'], 'pair')}, GSD {c['gsd_m']:.3f} m; cells of {c['cell_m']:.3g} m",
+        f"{c['photographs']} photographs in {pairs}, GSD {c['gsd_m']:.3f} m; cells of {c['cell_m']:.3g} m",
         f"{c['cells']['measured']} cells with a height, {c['area_m2']:.0f} m²; photographs of a cell: "
         f"{c['photographs_mean']:.1f}",
     ]

@@ -166,10 +166,7 @@ def _beyond(content: dict[str, Any], whole: _Whole) -> list[str]:
         told.append(f"net {with_sigma(bent['value_m3'], bent['sigma_m3'], signed=True)} m³")
     if not told:
         return []
-    return [
-        f"ground that straight lines between the heights are expected to leave out: {', '.join(told)}; not in the "
-        "volume, counted in σ"
-    ]
+    return [f"terrain between the measured points (estimated, not added): {', '.join(told)}; its error is counted in σ"]
 
 
 def _pile_line(pile: dict[str, Any], whole: _Whole) -> str:

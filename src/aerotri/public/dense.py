@@ -104,7 +104,7 @@ class DenseSurface:
         found = dense_json(self.record, self.block, self.crs, self.ground)
         return self.head.as_dict() | found | {
             "photographs_missing": list(self.missing), "adjustment": self.adjustment, "settings": self.settings,
-            "warnings": list(self.notes),
+            "notes": list(self.notes),
         }  # fmt: skip
 
     @property

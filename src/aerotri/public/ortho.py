@@ -242,7 +242,7 @@ def _made(
         room = tiles if in_threads or tiles is not None else stack.enter_context(room_beside(out))
         made = make_orthophoto(record, taken, heights, sigma, settings, folder, report.stage, room, workers)
         notes += (*_blurred(made.blur, taken[1]), *missing_in_words(missing, photographs))
-        said = {"photographs_missing": list(missing), "warnings": list(notes)}
+        said = {"photographs_missing": list(missing), "notes": list(notes)}
         outcome, summary, points = _described(record, made, ground.label, settings, folder, said)
         if plots:
             from aerotri.report.plots.rendering import save_plots

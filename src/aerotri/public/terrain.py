@@ -137,7 +137,7 @@ class TerrainModel:
 
         stated = {
             "photographs_missing": list(self.missing), "adjustment": self.adjustment,
-            "ground_within": self.ground_within, "settings": self.settings, "warnings": list(self.notes),
+            "ground_within": self.ground_within, "settings": self.settings, "notes": list(self.notes),
         }  # fmt: skip
         return self.head.as_dict() | terrain_json(self.record, self.block, self.crs) | stated
 

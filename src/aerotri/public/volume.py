@@ -314,8 +314,8 @@ def _refuse_apart(boundary: Boundary, reader: Reader) -> None:
             where = f" ({reader.crs_code})" if reader.crs_code else ""
             note = f"; {boundary.note}" if boundary.note else ""
             raise InputError(
-                f"'{name}' does not meet the surface: it lies at {place_in_words(polygon.bounds)}, the surface{where} at "
-                f"{place_in_words(edges)}{note}", "check the CRS of both", reader.path,
+                f"'{name}' does not meet the surface: it lies at {place_in_words(polygon.bounds)}, the "
+                f"surface{where} at {place_in_words(edges)}{note}", "check the CRS of both", reader.path,
             )  # fmt: skip
 
 

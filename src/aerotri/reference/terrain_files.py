@@ -37,7 +37,7 @@ PICKETS = (
 )
 MISSING = (
     Item("photographs_missing[]", "text", "Photographs of the block that were not among the files given."),
-    Item("warnings[]", "text", "Sentences to read."),
+    Item("notes[]", "text", "Sentences to read."),
 )
 DTM_JSON = (
     *HEAD,
