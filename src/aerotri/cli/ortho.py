@@ -37,6 +37,7 @@ def ortho(
     cell: Annotated[
         float | None,
         typer.Option(
+            "--cell", "--resolution",
             min=1e-6, help="Cell, m. Default: the size of a pixel on the ground (GSD).", rich_help_panel=OUTPUT
         ),
     ] = DEFAULTS.cell,

@@ -409,6 +409,7 @@ def _volumes(
 ) -> tuple[Volumes, ThicknessMap]:
     """All methods, the raster of the thickness on the way, and its map."""
     from aerotri.rasters.grids import RasterWriter
+    from aerotri.rasters.surface_files import make_cloud_optimised
     from aerotri.volume.compute import compute_volumes
     from aerotri.volume.sums import Window, cells_within
     from aerotri.volume.thickness import ThicknessMeans
@@ -429,5 +430,6 @@ def _volumes(
             writer.write(window.row - row, window.column - column, inside.astype(np.float32))
 
         volumes = compute_volumes(reader, base, boundary, asked.method, asked.plan, keep, report.counted)
+    make_cloud_optimised(spool.folder / THICKNESS)
     spool.refuse_full()
     return volumes, means.map()
