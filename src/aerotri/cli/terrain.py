@@ -221,7 +221,13 @@ def dsm(
         ),
     ] = DENSE_DEFAULTS.widest_object,
     executor: Workers = THREADS,
-    plots: Annotated[bool, typer.Option(help="Draw the surface.", rich_help_panel=OUTPUT)] = True,
+    plots: Annotated[
+        bool,
+        typer.Option(
+            help="Draw heights with their σ, and colours: PNG and SVG in the folder plots. A page has run alone.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = True,
     json_: Json = False,
 ) -> None:
     """The whole surface by dense matching: a height and its standard deviation for every cell."""
