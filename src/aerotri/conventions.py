@@ -35,6 +35,8 @@ EARTH_RADIUS_M = 6371000.0
 0.6 %."""
 SIGMA_PER_MAD = 1.4826
 """Factor from a median absolute deviation to the σ of a normal distribution, 1/Φ⁻¹(0.75) [L: Höhle & Höhle 2009]."""
+SIGMAS_OF_95 = 1.959963985
+"""Standard deviations of a normal distribution within which 95 % lie, Φ⁻¹(0.975)."""
 LEAST_ROOM = 16384
 """Bytes below which a disk counts as full; chosen [C]: file systems keep a few blocks of 4096 bytes back."""
 LONGEST_NAME = 120

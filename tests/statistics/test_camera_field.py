@@ -12,8 +12,8 @@ from aerotri.observations import Block
 from aerotri.pipeline.chain import adjust_keeping_system
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.truth import Truth
-from aerotri.statistics.camera_field import CameraField, camera_field, known_field
-from aerotri.statistics.cluster_fields import field_equations, half_format, node_counts
+from aerotri.statistics.camera_field import CameraField, camera_field, known_field, missing_in_sigma, not_looked_for
+from aerotri.statistics.cluster_fields import field_equations, half_formats, node_counts
 from aerotri.statistics.clusters import Clusters
 from aerotri.terrain.adjustment_part import variances_at
 from aerotri.volume.pickets import Pickets
@@ -129,15 +129,14 @@ def test_what_parameters_describe_moves_nothing():
     """A field that is b1 of the lens, which was estimated: what it does to rays and to unknowns cancels."""
     found = adjust_keeping_system(simulated(1, "brown:b1+b2")[0])
     system, block = found.system, found.local.block
-    counts, half = node_counts(block.cameras), half_format(block.cameras)
-    x, _ = np.meshgrid(*(h * np.linspace(-1.0, 1.0, k) for h, k in zip(half, counts, strict=True)), indexing="ij")
+    counts, half = node_counts(block.cameras), half_formats(block.cameras)
+    x, _ = np.meshgrid(*(h * np.linspace(-1.0, 1.0, k) for h, k in zip(half[0], counts[0], strict=True)), indexing="ij")
     pattern = np.zeros((1, 2, x.size, 1))
     pattern[0, 0, :, 0] = 1e-3 * x.ravel()
     one = Clusters("camera", np.zeros(len(system.unknowns.images), np.int64), ("",), 1)
     factor = system.factorise(found.solution.equations)
     by = factor.solve(field_equations(system, found.solution, factor, one).sides @ pattern.reshape(-1, 1))
-    half_of_all = np.array([camera.half_format_mm for camera in block.cameras])
-    left = CameraField(1.0, 1.0, 20.0, found.local.outcome.sigma0, pattern, half_of_all, counts, np.zeros(1, int), by)
+    left = CameraField(1.0, 1.0, 20.0, found.local.outcome.sigma0, pattern, half, counts, np.zeros(1, int), by)
     rows, seen = np.arange(len(block.images)), found.local.points.rays >= 3
     tie = np.setdiff1d(np.flatnonzero(seen), block.control.point)[:40]
     xyz, photographs = found.result.points.xyz[tie], rays_of(block, tie)
@@ -149,8 +148,8 @@ def test_what_parameters_describe_moves_nothing():
 def test_rays_move_by_the_errors_at_their_places():
     """A field that grows with x: bilinear between nodes it is itself; the sum over rays is that of every ray."""
     camera = simulated(1, "none")[0].cameras[0]
-    counts, half = node_counts([camera]), np.array([camera.half_format_mm])
-    x, _ = np.meshgrid(*(h * np.linspace(-1.0, 1.0, k) for h, k in zip(half[0], counts, strict=True)), indexing="ij")
+    counts, half = node_counts([camera]), half_formats([camera])
+    x, _ = np.meshgrid(*(h * np.linspace(-1.0, 1.0, k) for h, k in zip(half[0], counts[0], strict=True)), indexing="ij")
     pattern = np.zeros((1, 2, x.size, 1))
     pattern[0, 0, :, 0] = 1e-3 * x.ravel()
     left = CameraField(1.0, 1.0, 20.0, 1.0, pattern, half, counts, np.zeros(1, int), np.zeros((0, 1)))
@@ -162,3 +161,17 @@ def test_rays_move_by_the_errors_at_their_places():
 
 def test_a_field_that_is_switched_off_is_not_found():
     assert known_field(adjust_keeping_system(simulated(1, "brown:K1", 5.0)[0])) is None
+
+
+def test_blocks_that_are_not_looked_at_say_why(monkeypatch):
+    found = adjust_keeping_system(with_adjustment(simulated(1, "brown:K1")[0], model_part="on"))
+    assert not_looked_for(found) == missing_in_sigma(found) == ""
+    with monkeypatch.context() as changed:
+        changed.setattr("aerotri.statistics.camera_field.MOST_PHOTOGRAPHS", 9)
+        assert missing_in_sigma(found).startswith("the block has 10 photographs, more than 9: image errors that ")
+        assert camera_field(found) is None
+        off = adjust_keeping_system(simulated(1, "brown:K1")[0])
+        assert not_looked_for(off)
+        assert missing_in_sigma(off) == ""
+    free = adjust_keeping_system(with_adjustment(simulated(1, "brown:K1")[0], model_part="on", datum="inner"))
+    assert missing_in_sigma(free).startswith("the datum of the block is free: image errors that ")

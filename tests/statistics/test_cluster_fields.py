@@ -56,10 +56,10 @@ def test_columns_of_the_unknowns_are_those_of_dense_algebra(small):
     """F = Q·AᵀPB·R of photographs, shared parameters and points."""
     found, clusters, equations, design, basis, _ = small
     field = fitted_field(found.system, found.solution, _factor(found), 1.0, clusters)
-    root = np.random.default_rng(1).normal(size=(equations.nodes.count, 2))
+    root = np.random.default_rng(1).normal(size=(1, equations.nodes.count, 2))
     made, squares = root_of_field(found.system, found.solution, _factor(found), clusters, replace(field, root=root))
     scale = 1.0 / np.linalg.norm(design, axis=0)
-    right = (design * scale).T @ basis @ np.kron(np.eye(6), root)
+    right = (design * scale).T @ basis @ np.kron(np.eye(6), root[0])
     expected = np.linalg.solve((design * scale).T @ (design * scale), right) * scale[:, None]
     u = found.system.unknowns
     n, s = 6 * len(u.images), len(u.shared)

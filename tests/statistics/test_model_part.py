@@ -195,7 +195,7 @@ def test_moving_errors_are_found_and_their_size_is_right():
         system, solution, u = found.system, found.solution, found.system.unknowns
         q = cofactors(system, solution.state, _factor(found), solution.estimator)
         excess = excess_of_clusters(
-            system, solution, _factor(found), schemes[0], found.local.outcome.sigma0, q.images, q.shared, q.points
+            system, solution, _factor(found), schemes[0], found.local.outcome.sigma0, (q.images, q.shared, q.points)
         )
         stated = found.local.points.covariance[u.points]
         error = (found.local.points.xyz - truth.points)[u.points]

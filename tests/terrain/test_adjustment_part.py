@@ -11,11 +11,14 @@ from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.simulation import parse_spec, simulate
 from aerotri.statistics.camera_field import known_field
+from aerotri.statistics.image_sigma import image_sigma_of_cameras
 from aerotri.terrain.adjustment_part import adjustment_variances, covariances_at
 from aerotri.terrain.photographs import photographs_of
 from aerotri.terrain.pickets import Pickets
+from aerotri.volume.pickets import Pickets as PicketsOfVolume
 from aerotri.volume.pickets import pickets_of_names
 from aerotri.volume.response import respond
+from rig_blocks import NADIR, rig_block
 from rolling_blocks import rolling_spec
 from small_blocks import small_block, with_adjustment
 
@@ -105,6 +108,32 @@ def test_variances_of_a_free_block_are_those_of_its_datum(parameters):
         for axis, along in enumerate(np.eye(3)):
             response = respond(found, picket, along[None])
             assert covariance[k, axis, axis] == pytest.approx(response.variance + response.model, rel=1e-3)
+
+
+def test_rays_of_an_accurate_camera_count_more():
+    """A second head with a σ four times as large, as a volume has it by other code, which is given σ of every ray."""
+    oblique = NADIR | {"pixel_um": 4.0 * NADIR["pixel_um"], "size_px": [1500, 1000]}
+    block, _ = rig_block(1, cameras=("fore",), camera={"nadir": NADIR, "fore": oblique})
+    rays, names = block.image_points, block.images.names
+    factor = np.where(block.images.camera[rays.image] == 1, 4.0, 1.0)[:, None]
+    block = with_adjustment(replace(block, image_points=replace(rays, sigma=factor * rays.sigma)), model_part="off")
+    found = adjust_keeping_system(block)
+    of_camera = image_sigma_of_cameras(found)
+    images = [rays.image[rays.point == point] for point in range(len(block.points))]
+    both = [k for k, own in enumerate(images) if len(own) >= 3 and len(set(block.images.camera[own])) == 2][:8]
+    seen = np.full((len(both), max(len(images[k]) for k in both)), -1)
+    for row, k in zip(seen, both, strict=True):
+        row[: len(images[k])] = images[k]
+    xyz = found.result.points.xyz[both]
+    covariance = covariances_at(found, restitution_of(found), np.arange(len(names)), xyz, seen)
+    for place, (k, point) in enumerate(zip(both, xyz, strict=True)):
+        sigma = of_camera[block.images.camera[images[k]]]
+        start = np.array([0, len(sigma)], np.int64)
+        picket = PicketsOfVolume(point[None], start, images[k].astype(np.int64), sigma, np.ones(1))
+        for axis, along in enumerate(np.eye(3)):
+            assert covariance[place, axis, axis] == pytest.approx(
+                respond(found, picket, along[None]).variance, rel=1e-3
+            )
 
 
 @pytest.mark.parametrize("parameters", ["legendre:3x3", "brown:K1+K2+b1"])

@@ -7,8 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aerotri.tie_points.misfit import FEWEST, with_sigma_of_ties, without_smooth_part
+from aerotri.conventions import InputError
+from aerotri.formats.assembly.reprojection import reproject
+from aerotri.tie_points import misfit
+from aerotri.tie_points.misfit import FEWEST, adjusted_offsets, with_sigma_of_ties, without_smooth_part
+from aerotri.tie_points.orientation import in_frame
 from rig_blocks import NADIR, rig_block
+from small_blocks import small_block
 
 
 @pytest.mark.parametrize("bent_px", [0.0, 3.0])
@@ -45,3 +50,26 @@ def test_sigma_in_pixels_is_that_of_cameras_with_other_pixels_too(fewer):
     offset = np.random.default_rng(3).normal(0.0, 0.3, (len(rays), 2))
     found, sigma_px = with_sigma_of_ties(given, offset, len(block.points))
     np.testing.assert_allclose(found.image_points.sigma / pixel, sigma_px, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("error", "why"),
+    [(InputError("no point is measured twice", "measure"), "no point is measured twice"),
+     (np.linalg.LinAlgError("singular"), "the equations cannot be solved")],
+)  # fmt: skip
+def test_an_orientation_that_cannot_be_adjusted_is_said(monkeypatch, error, why):
+    """The offsets are those of the start values, and whoever reads σ is told."""
+    block, _ = small_block(1)
+    found = reproject(*in_frame(block, None))
+    after, said = adjusted_offsets(block, found.points, found.offset_px)
+    assert said == ""
+    assert np.std(after) < 0.5 * np.std(found.offset_px)
+
+    def failing(*_):
+        raise error
+
+    monkeypatch.setattr(misfit, "minimise", failing)
+    same, said = adjusted_offsets(block, found.points, found.offset_px)
+    assert same is found.offset_px
+    assert said.startswith("the standard deviation of tie points contains errors of the first orientation")
+    assert said.endswith(why)

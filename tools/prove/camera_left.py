@@ -135,7 +135,8 @@ def beforehand(found: Adjustment, left: CameraField) -> CameraField:
     factor = found.system.factorise(found.solution.equations)
     one = Clusters(CAMERA, np.zeros(len(u.images), np.int64), ("",), 1)
     sides = field_equations(found.system, found.solution, factor, one).sides
-    power, patterns = np.linalg.eigh(left.sigma**2 * correlations(u.block.cameras, left.length, True))
+    # there is one camera
+    power, patterns = np.linalg.eigh(left.sigma**2 * correlations(u.block.cameras, left.length, True)[0])
     root = np.kron(np.eye(2 * len(left.root)), patterns * np.sqrt(np.maximum(power, 0.0)))
     by_unknowns = factor.solve(np.ascontiguousarray(sides @ root))
     by_unknowns[: 6 * len(u.images)] *= u.eo_free.reshape(-1, 1)

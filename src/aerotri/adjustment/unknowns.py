@@ -285,12 +285,16 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
     linear = linear_parameters(block, images, ray_image, shared)
     if block.settings.photograph_fields.correlated == "on":
         linear = linear.beside(add_photograph_fields(block, images, ray_image, shared))
-    columns = linear.columns(at)
     on_rigs = photographs_on_rigs(block, images, shared, start.centre, start.rotation)
     tied = np.zeros((0, 2), dtype=np.int64)
     if on_rigs is not None:
         tied = np.stack([on_rigs.lead[on_rigs.tied], on_rigs.tied], axis=1)
     scanning = scanning_of(block, images, shared, start.centre[images], start.rotation[images])
+    columns = linear.columns(at)
+    rays = Rays(
+        row_start, ray_image, lens.of_image[ray_image], xy, at, 1.0 / block.image_points.sigma.take(source, axis=0),
+        columns.index, columns.value, source, linear.held.image_errors(at),
+    )  # fmt: skip
     pair_start, pair_block, block_row, block_col, tie_block = _pattern(len(images), row_start, ray_image, tied)
     prior_xyz, prior_weight, held = _control_priors(block, points, start.origin)
     unknowns = Unknowns(
@@ -298,18 +302,7 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
         images=images,
         points=points,
         origin=start.origin,
-        rays=Rays(
-            start=row_start,
-            image=ray_image,
-            lens_row=lens.of_image[ray_image],
-            xy=xy,
-            at=at,
-            inv_sigma=1.0 / block.image_points.sigma.take(source, axis=0),
-            ap_index=columns.index,
-            ap_value=columns.value,
-            source=source,
-            held=linear.held.image_errors(at),
-        ),
+        rays=rays,
         lens=lens,
         linear=linear,
         shared=shared,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.deformation.orientation import Orientation
 from aerotri.image_errors.error_function import ErrorFunction
 from aerotri.image_errors.moving_errors import MovingErrors
@@ -59,7 +60,7 @@ def ground_plane(u: np.ndarray) -> np.ndarray:
     for _ in range(3):
         plane = np.linalg.lstsq(design[used], right[used], rcond=None)[0]
         away = np.abs(right - design @ plane)
-        used = away <= OUTLYING * 1.4826 * max(float(np.median(away)), 1e-12)
+        used = away <= OUTLYING * SIGMA_PER_MAD * max(float(np.median(away)), 1e-12)
     return plane
 
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import ConvexHull, KDTree, QhullError
 
+from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.diagnosis.accuracy_rules import axis_targets, requirements, warnings
 from aerotri.diagnosis.accuracy_sentences import statements
 from aerotri.diagnosis.check_points import sigma_given
@@ -29,7 +30,7 @@ from aerotri.results.head import Head
 
 BLUNDER = 3.0
 """Times the target RMSE of a coordinate, from which an error is a blunder [L: ASPRS edition 2, 7.2]."""
-MODIFIED_Z, MAD_TO_SIGMA, FEWEST = 3.5, 1.4826, 8
+MODIFIED_Z, FEWEST = 3.5, 8
 """An error so many robust σ from the median stands out [L: Iglewicz, Hoaglin 1993]; with fewer points nothing is said
 of outliers and skew; chosen [C]."""
 NEAR = 0.1
@@ -159,7 +160,7 @@ def suspect_errors(points: CheckedPoints, asked: Asked) -> tuple[SuspectError, .
         own = np.isfinite(points.difference[:, k]) & ~(points.vegetated & (k == 2))
         d, names = points.difference[own, k], points.names[own]
         limit = np.inf if target is None else BLUNDER * target
-        scale = MAD_TO_SIGMA * float(np.median(np.abs(d - np.median(d)))) if len(d) >= FEWEST else 0.0
+        scale = SIGMA_PER_MAD * float(np.median(np.abs(d - np.median(d)))) if len(d) >= FEWEST else 0.0
         for name, value in zip(names, d, strict=True):
             if abs(value) > limit:
                 found.append(SuspectError(str(name), axis, float(value), "over three times the target RMSE: a blunder"))

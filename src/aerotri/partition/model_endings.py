@@ -52,7 +52,7 @@ class Patterns:
 
     Parameters
     ----------
-    root : (nodes, k) of the field of every one.
+    root : (m, nodes, k) of the field of every one.
     """
 
     labelled: Labelled

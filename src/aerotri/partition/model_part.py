@@ -174,7 +174,8 @@ class _PartsModel:
 
     def _of_field(self, clusters: Clusters, field: Field) -> tuple[list[Grown], np.ndarray]:
         sides = self._solver.next_sides()
-        patterns = Patterns(self._by_camera(clusters, sides), field.root)
+        labelled = self._by_camera(clusters, sides)
+        patterns = Patterns(labelled, field.root[labelled.camera])
         _, shared = self._solver.solve(sides, pattern_part, patterns)
         grown = self._course.run(patterned_part, (patterns, self._sigma0))
         self._solver.drop(sides)

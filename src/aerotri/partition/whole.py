@@ -81,8 +81,36 @@ def whole_of(
     worst = max((part.verdict for part in written), key=GRADES.index)
     names = tuple(part.name for part in written)
     reasons = [f"part {part.name}: {said}" for part in written for said in part.reasons]
+    block = _block_of_all(first, points, control, check)
+    count_points, count_rays = sum(part.points for part in written), sum(part.rays for part in written)
+    note = f"adjusted in {len(names)} parts: {photographs} photographs, {count_points} points, {count_rays} rays"
+    record = AdjustedBlock(
+        block=block,
+        outcome=replace(
+            outcome,
+            verdict=worst,
+            reasons=tuple(reasons[:MOST_REASONS]),
+            notes=(note, NOT_LOOKED_FOR),
+            warnings=tuple(text for text in (model_part_in_words(model_part),) if text),
+        ),
+        images=ImageResults(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 6, 6)), np.zeros(0, dtype=np.int64)),
+        points=PointResults(adjusted, np.zeros((len(points), 3, 3)), np.zeros(len(points), int), np.zeros(len(points))),
+        rays=RayResults(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int8)),
+        parameters=parameters,
+        control=of_control,
+        check=of_check,
+        groups=_groups(written),
+        blunders=_largest(written),
+        model_part=model_part,
+    )
+    picture = whole_picture(record, [one.picture for one in written], _part_rows(written), every)
+    return Whole(record, names, photographs, count_points, count_rays, picture)
+
+
+def _block_of_all(first: Block, points: np.ndarray, control: Control, check: Control) -> Block:
+    """A block of the ground points alone, `points` (n,) their names, without photographs and image points."""
     nothing = np.zeros(0, dtype=np.int64)
-    block = replace(
+    return replace(
         first,
         name=first.name.rpartition(" part ")[0] or first.name,
         images=replace(
@@ -99,36 +127,16 @@ def whole_of(
         ),
         gnss_ins=None,
     )  # fmt: skip
-    count_points, count_rays = sum(part.points for part in written), sum(part.rays for part in written)
-    note = f"adjusted in {len(names)} parts: {photographs} photographs, {count_points} points, {count_rays} rays"
-    record = AdjustedBlock(
-        block=block,
-        outcome=replace(
-            outcome,
-            verdict=worst,
-            reasons=tuple(reasons[:MOST_REASONS]),
-            notes=(note, NOT_LOOKED_FOR),
-            warnings=tuple(text for text in (model_part_in_words(model_part),) if text),
-        ),
-        images=ImageResults(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 6, 6)), nothing),
-        points=PointResults(adjusted, np.zeros((len(points), 3, 3)), np.zeros(len(points), int), np.zeros(len(points))),
-        rays=RayResults(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int8)),
-        parameters=parameters,
-        control=of_control,
-        check=of_check,
-        groups=_groups(written),
-        blunders=_largest(written),
-        model_part=model_part,
-    )
-    rows = [
+
+
+def _part_rows(written: Sequence[Written]) -> list[PartRow]:
+    return [
         PartRow(
             one.name, one.picture.photographs, one.picture.shared, one.points, one.rays, one.picture.largest_w,
             one.picture.beyond, one.picture.sigma, one.verdict,
         )
         for one in written
     ]  # fmt: skip
-    picture = whole_picture(record, [one.picture for one in written], rows, every)
-    return Whole(record, names, photographs, count_points, count_rays, picture)
 
 
 def write_whole(whole: Whole, folder: Path) -> None:

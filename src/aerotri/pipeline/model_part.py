@@ -57,12 +57,11 @@ def with_model_part(found: Adjustment) -> Adjustment:
         excess = excess_of_root(system, solution, root, squares)
     elif inner is not None:
         q = cofactors(system, solution.state, factor, solution.estimator)
-        excess = excess_of_clusters(system, solution, factor, clusters, sigma0, q.images, q.shared, q.points, inner)
+        excess = excess_of_clusters(system, solution, factor, clusters, sigma0, (q.images, q.shared, q.points), inner)
     else:
-        excess = excess_of_clusters(
-            system, solution, factor, clusters, sigma0, factor.inverse_on_pattern().blocks[: len(u.images)].copy(),
-            factor.border_inverse(), found.local.points.covariance[u.points] / sigma0**2,
-        )  # fmt: skip
+        of_images = factor.inverse_on_pattern().blocks[: len(u.images)].copy()
+        q = of_images, factor.border_inverse(), found.local.points.covariance[u.points] / sigma0**2
+        excess = excess_of_clusters(system, solution, factor, clusters, sigma0, q)
     part = with_ratios(part, growth_of(found.local.points.covariance[u.points], excess.points))
     local = replace(spread_over_block(u, found.local, excess.images, excess.shared, excess.points), model_part=part)
     return replace(_with(found, local, begun), model=excess.root)

@@ -122,8 +122,9 @@ def pair_of(
 
 
 def doubts_of(epochs: Epochs) -> list[str]:
-    """Sentences on adjustments that are not simply accepted."""
-    return [one.adjustment.doubt for one in epochs if one.adjustment is not None and one.adjustment.doubt]
+    """Sentences on adjustments that are not simply accepted, and on what their σ lacks; each once."""
+    stated = [one.adjustment for one in epochs if one.adjustment is not None]
+    return list(dict.fromkeys(text for one in stated for text in (one.doubt, one.missing) if text))
 
 
 def names_of(epochs: Epochs) -> tuple[str, str]:

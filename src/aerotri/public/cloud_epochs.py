@@ -145,7 +145,7 @@ def by_adjustments(
         check_crs(stated.record, epsg, Path(epoch.label))
     records = (first.record, first.record if second.is_same(first) else second.record)
     adjusted = adjusted_distances(found, clouds, records)
-    said = [one.doubt for one in (first, second) if one.doubt]
+    said = list(dict.fromkeys(text for one in (first, second) for text in (one.doubt, one.missing) if text))
     return with_adjustments(found, clouds, adjusted), adjusted, [*said, adjusted.words], True
 
 

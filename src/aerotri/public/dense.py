@@ -48,7 +48,8 @@ class DenseSurface:
     ground : the ground without objects, None where it was not asked for.
     keeper : what removes the tiles when nobody uses them any more; None where they stay.
     head : of files. settings : every argument that was used, as dsm.json has them.
-    missing : photographs of the block that were not given. notes : on the input, in sentences.
+    missing : photographs of the block that were not given.
+    notes : on the input and on what σ lacks, in sentences.
     """
 
     record: DenseOutcome
@@ -232,6 +233,7 @@ def _measured(
 ) -> DenseSurface:  # fmt: skip
     from aerotri.execution.opening import opened
     from aerotri.formats.files.spool import Spool
+    from aerotri.statistics.camera_field import missing_in_sigma
     from aerotri.terrain.dense.bare_ground import bare_ground
     from aerotri.terrain.dense.measure import DensePlan, measure_surface
     from aerotri.terrain.dtm import chosen_rows
@@ -257,10 +259,10 @@ def _measured(
     ground = bare_ground(outcome, settings.widest_object) if settings.ground else None
     block = record.result.block
     used = used_settings(dense_surface, settings, {"resolution": "m", "area": "m", "widest_object": "m"})
-    return DenseSurface(
-        outcome, str(block.name), block.crs, key, ground, keeper, Head(block.project, block.crs), used, missing,
-        missing_in_words(missing, photographs),
-    )  # fmt: skip
+    lacks = missing_in_sigma(record)
+    notes = (*missing_in_words(missing, photographs), *((lacks,) if lacks else ()))
+    head = Head(block.project, block.crs)
+    return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper, head, used, missing, notes)
 
 
 def _surface_parts(o: DenseOutcome) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:

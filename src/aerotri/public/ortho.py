@@ -91,7 +91,8 @@ class Orthophoto:
     Parameters
     ----------
     folder : with ortho.tif and what belongs to it. summary : the content of ortho.json.
-    record : the numbers as arrays. points : control and check points in it. notes : on the input, in sentences.
+    record : the numbers as arrays. points : control and check points in it. notes : on the input
+        and on what σ lacks, in sentences.
     """
 
     folder: Path
@@ -222,6 +223,7 @@ def _made(
 ) -> Orthophoto:  # fmt: skip
     from aerotri.formats.files.atomic import atomic_folder, room_beside
     from aerotri.rasters.grids import cache_limited
+    from aerotri.statistics.camera_field import missing_in_sigma
     from aerotri.terrain.dtm import chosen_rows
     from aerotri.terrain.ortho.make import CACHE_BYTES, make_orthophoto
 
@@ -241,7 +243,9 @@ def _made(
         workers = None if in_threads else stack.enter_context(opened(executor, report.said))
         room = tiles if in_threads or tiles is not None else stack.enter_context(room_beside(out))
         made = make_orthophoto(record, taken, heights, sigma, settings, folder, report.stage, room, workers)
-        notes += (*_blurred(made.blur, taken[1]), *missing_in_words(missing, photographs))
+        lacks = missing_in_sigma(record)
+        notes += (*_blurred(made.blur, taken[1]), *((lacks,) if lacks else ()))
+        notes += missing_in_words(missing, photographs)
         said = {"photographs_missing": list(missing), "notes": list(notes)}
         outcome, summary, points = _described(record, made, ground.label, settings, folder, said)
         if plots:

@@ -67,6 +67,13 @@ class StatedAdjustment:
             return ""
         return f"{self.source}: the adjustment is {outcome.verdict}: {outcome.reasons[0]}"
 
+    @property
+    def missing(self) -> str:
+        """A sentence when σ lacks what the adjustment could not look for, '' else."""
+        from aerotri.statistics.camera_field import missing_in_sigma
+
+        return missing_in_sigma(self.record)
+
     def is_same(self, other: StatedAdjustment | None) -> bool:
         """Whether both are one folder, or one result."""
         if other is None or isinstance(self.source, Adjustment) or isinstance(other.source, Adjustment):

@@ -79,7 +79,7 @@ class TerrainModel:
     record : the numbers as arrays.
     block : name of the block. crs : its coordinate system.
     adjustment : key of the adjustment it was measured with.
-    notes : what was done with the input before, in sentences.
+    notes : what was done with the input before and what σ lacks, in sentences.
     ground_within : name of the outline within which all is ground; '' where there is none.
     head : of files. settings : every argument that was used, as dtm.json has them.
     missing : photographs of the block that were not given.
@@ -300,6 +300,7 @@ def measure_terrain(
     from aerotri.execution.opening import opened
     from aerotri.execution.work import Workplace
     from aerotri.formats.files.spool import Spool
+    from aerotri.statistics.camera_field import missing_in_sigma
     from aerotri.terrain.dtm import chosen_rows, make_terrain_model
     from aerotri.volume.shared import adjustment_key
 
@@ -316,6 +317,8 @@ def measure_terrain(
             notes = (*notes, outline.note) if outline.note else notes
         with opened(executor, report.said) as workers:
             outcome = make_terrain_model(record, plan, report.stage, Workplace(workers, spool.folder))
+    lacks = missing_in_sigma(record)
+    notes = (*notes, lacks) if lacks else notes
     head = Head(block.project, block.crs)
     missing = missing_photographs(record, chosen_rows(record, settings.subset), plan.rows)
     used = used_settings(terrain, settings, {"interval": "m", "cell": "m", "area": "m", "window": "px"})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
@@ -328,7 +328,7 @@ def _piles(asked: _Asked, base: Base | None, reader: Reader, boundary: Boundary)
 
     found: list[Pile] = []
     for name, polygon in boundary.piles:
-        own = boundary_of(polygon, name)
+        own = replace(boundary_of(polygon, name), beside=boundary.polygon)
         try:
             below = parse_base(str(asked.base), reader, own) if base is None else base
             volumes = compute_volumes(reader, below, own, asked.method, asked.plan)

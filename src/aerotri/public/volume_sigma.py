@@ -169,7 +169,8 @@ class SigmaOfVolumes:
     def _notes(self) -> tuple[str, ...]:
         from aerotri.volume.shared import adjustment_key
 
-        notes = self._below[1]
+        missing = [one.adjustment.missing for one in (self.top, self.below) if one is not None and one.adjustment]
+        notes = (*dict.fromkeys(text for text in missing if text), *self._below[1])
         if self.top.is_model and self.top.key != adjustment_key(self.record):
             return (f"{self.top.surface.label} was measured with another adjustment than the one stated", *notes)
         return notes

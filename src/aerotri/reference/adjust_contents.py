@@ -153,7 +153,7 @@ ADJUSTMENT = (
     Item("model_part.tests[].p_random", "number?", "Probability of such a ratio by what random groups show."),
     Item("model_part.tests[].counts", "yes/no", "Whether both probabilities are small enough."),
     Item("model_part.tests[].field_um", "number?", "σ of the random field of every group, where there is one.", "µm"),
-    Item("model_part.tests[].field_mm", "number?", "Its correlation length in the image.", "mm"),
+    Item("model_part.tests[].field_mm", "number?", "Its correlation length in the image, in the largest format.", "mm"),
     Item("model_part.tests[].reason", "text", "Why there was no test; else empty."),
     Item("model_part.ratio_plan", "number", "Total σ over σ of the noise in X and Y, median of the points."),
     Item("model_part.ratio_height", "number", "The same in Z."),

@@ -29,7 +29,6 @@ ORTHO_JSON = (
     BLOCK,
     Item("surface", "text", "The surface that heights were taken from."),
     Item("photographs_missing[]", "text", "Photographs of the block that were not among the files given."),
-    Item("notes[]", "text", "Sentences to read."),
     Item("cell_m", "number", "Cell of the orthophoto.", "m"),
     Item("columns", "whole", "Cells from west to east."),
     Item("rows", "whole", "Cells from north to south."),
@@ -84,6 +83,7 @@ ORTHO_JSON = (
     Item("photographs[].area_m2", "number", "Area taken from it.", "m²"),
     Item("photographs[].gain[]", "number", "Factor of its colours, by band."),
     Item("photographs[].offset[]", "number", "Added to its colours, by band, share of white."),
+    Item("notes[]", "text", "What was done with the input, and what σ lacks, in sentences."),
     *ARGUMENTS,
 )
 

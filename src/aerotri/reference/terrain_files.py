@@ -35,10 +35,7 @@ PICKETS = (
     Item("steps_aside", "whole", "How often it was moved because its first place could not be measured."),
     Item("model", "whole", "Number of the pair of photographs, −1 where all photographs were used."),
 )
-MISSING = (
-    Item("photographs_missing[]", "text", "Photographs of the block that were not among the files given."),
-    Item("notes[]", "text", "Sentences to read."),
-)
+MISSING = (Item("photographs_missing[]", "text", "Photographs of the block that were not among the files given."),)
 DTM_JSON = (
     *HEAD,
     BLOCK,
@@ -68,6 +65,7 @@ DTM_JSON = (
     Item("ground_share", "number", "Share of the points that are ground, not objects."),
     Item("ground_within", "text", "Outline within which all is ground; empty where none was given."),
     Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
+    Item("notes[]", "text", "What was done with the input, and what σ lacks, in sentences."),
     *ARGUMENTS,
 )
 DSM_JSON = (
@@ -118,6 +116,7 @@ DSM_JSON = (
     Item("ground.bridge.power", "number", "Power by which it grows with the distance."),
     Item("ground.bridge.discs", "whole", "Discs of ground that were taken out, bridged and compared to find it."),
     Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
+    Item("notes[]", "text", "What was done with the input, and what σ lacks, in sentences."),
     *ARGUMENTS,
 )
 DIFFERENCE = (

@@ -103,21 +103,22 @@ def field_sides(first, last, problem, nodes, found, work):
 
 @kernel
 def field_point_sides(first, last, problem, nodes, root, sides, work):
-    """A_pᵀP·B·R of the points first..last, added to `sides` (P, 3, 2·m·k), R = root (nodes, k) in every component."""
+    """A_pᵀP·B·R of the points first..last, added to `sides` (P, 3, 2·m·k), R = root (m, nodes, k) in x and in y."""
     rays, table, at, points, weighting = (
         problem.rays, problem.table, problem.values, problem.points, problem.weighting,
     )  # fmt: skip
     start, image, inv_sigma, weight, by_pt = rays.start, rays.image, rays.inv_sigma, weighting.weight, work.by_pt
-    node, share, label, k = nodes.node, nodes.weight, nodes.label, root.shape[1]
+    node, share, label, k = nodes.node, nodes.weight, nodes.label, root.shape[2]
     for p in range(first, last):
         linearise_point(p, rays, table, at, points, weighting, work)
         for q in range(start[p + 1] - start[p]):
             ray = start[p] + q
-            begun = 2 * label[image[ray]] * k
+            part = label[image[ray]]
+            begun = 2 * part * k
             for f in range(k):
                 value = 0.0
                 for corner in range(4):
-                    value += share[ray, corner] * root[node[ray, corner], f]
+                    value += share[ray, corner] * root[part, node[ray, corner], f]
                 for row in range(2):
                     whitened = value * inv_sigma[ray, row] * np.sqrt(weight[ray])
                     for a in range(3):

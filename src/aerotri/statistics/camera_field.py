@@ -2,10 +2,10 @@
 
 The adjustment takes image errors for noise. What all photographs of a camera share bends a surface that is measured in
 them, however many cells there are. [D] As in `cluster_fields` camera k has the errors s_k = B·p_k at its rays, p_k its
-nodes over the format with the covariance σ_s²·R, R = exp(−ρ²/2ℓ²), and the scores h = BᵀPv have the covariance
-σ0²·K + σ_s²·K·R·K. Here the noise is not known beforehand: σ̂0 of the adjustment holds the field. With γ = σ_s²/σ0²,
-the eigenvalues λ of K^½·R·K^½, z = h in their directions, whitened, and the redundancy r the restricted likelihood is
-that of
+nodes over the format with the covariance σ_s²·R, R = exp(−ρ²/2ℓ²), ℓ a share of its own half diagonal, and the scores
+h = BᵀPv have the covariance σ0²·K + σ_s²·K·R·K. Here the noise is not known beforehand: σ̂0 of the adjustment holds the
+field. With γ = σ_s²/σ0², the eigenvalues λ of K^½·R·K^½, z = h in their directions, whitened, and the redundancy r the
+restricted likelihood is that of
 
     r·ln Ω(γ) + Σ ln(1 + γλ),   Ω(γ) = vᵀPv − Σ z²·γλ/(1 + γλ),   σ0² = Ω/r.
 
@@ -27,20 +27,22 @@ import numpy as np
 
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.cluster_fields import (
-    KEPT,
+    NODES,
     SIZES,
     FieldEquations,
     correlations,
     field_equations,
-    half_format,
+    half_formats,
     node_counts,
     nodes_at,
+    roots_of_fields,
+    spread_of_fields,
 )
 from aerotri.statistics.cluster_test import LEVEL
-from aerotri.statistics.clusters import CAMERA, LARGE, Clusters
+from aerotri.statistics.clusters import CAMERA, Clusters
 
 LENGTHS = (0.2, 0.28, 0.4, 0.57, 0.8, 1.13, 1.6)
-"""Correlation lengths looked at, in half diagonals of the format, from that of the nodes to that of the format."""
+"""Correlation lengths looked at, in half diagonals of each format, from that of the nodes to that of the format."""
 SEEN = 1e-4
 """Eigenvalue of K over the largest below which a pattern does not count; chosen [C]: the unknowns take nearly all of it
 up, and what is left shows where the iterations ended."""
@@ -48,6 +50,9 @@ LEAST = 1e-12
 """Of vᵀPv that no field explains: rounding."""
 MOST_CAMERAS = 12
 """Cameras with a field each at most; chosen [C]: each has seventy columns in the equations."""
+MOST_PHOTOGRAPHS = 60_000
+"""Photographs times cameras at most; chosen [C]: the equations have 3.4 kB of each, held about eight times, so that
+they need 1.6 GB then. 20 000 photographs of one camera take 3.5 s of one processor, the adjustment 58 s."""
 
 
 _KNOWN: WeakKeyDictionary[Adjustment, CameraField | None] = WeakKeyDictionary()
@@ -59,11 +64,11 @@ class CameraField:
 
     Parameters
     ----------
-    sigma : mm, of an image coordinate. length : mm.
+    sigma : mm, of an image coordinate. length : ℓ as a share of the half diagonal of each camera's format.
     gain : twice the logarithm of the likelihood with the field over that without.
     noise : σ0 of what the field leaves as noise, dimensionless; σ̂0 of the adjustment holds both.
     root : (m, 2, nodes, k) mm, root·rootᵀ the mean products of the nodes of all parts, given the residuals.
-    half : (c, 2) mm, half formats of all cameras. counts : nodes along x and y.
+    half : (c, 2) mm, half formats of all cameras. counts : (c, 2) their nodes along x and y.
     part : (c,) place of a camera among the m with photographs, −1 for others.
     by_unknowns : (6n + s, k) F·root of the unknowns of the reduced system.
     """
@@ -74,7 +79,7 @@ class CameraField:
     noise: float
     root: np.ndarray
     half: np.ndarray
-    counts: tuple[int, int]
+    counts: np.ndarray
     part: np.ndarray
     by_unknowns: np.ndarray
 
@@ -85,13 +90,13 @@ class CameraField:
         ----------
         xy : (r, 2) mm from the middle of the format. camera : (r,).
         """
-        node, weight = nodes_at(xy, self.half[camera], self.counts)
+        node, weight = nodes_at(xy, self.half[camera], self.counts[camera])
         own = self.root[self.part[camera][:, None], :, node]
         return np.einsum("rdi,rc,rcik->rdk", gain, weight, own, optimize=True)
 
     def summed(self, gain: np.ndarray, xy: np.ndarray, camera: np.ndarray) -> np.ndarray:
         """(k,) the sum over many rays of what `moved` gives for each, gains (r, 2)."""
-        node, weight = nodes_at(xy, self.half[camera], self.counts)
+        node, weight = nodes_at(xy, self.half[camera], self.counts[camera])
         onto, part = np.zeros(self.root.shape[:3]), self.part[camera][:, None]
         for axis in range(2):
             np.add.at(onto[:, axis], (part, node), weight * gain[:, axis, None])
@@ -119,24 +124,52 @@ def is_of_camera(found: Adjustment) -> bool:
     return part is not None and part.counts and (part.clusters == 1 or part.scheme == CAMERA)
 
 
-def camera_field(found: Adjustment) -> CameraField | None:
-    """The fields; None where the residuals are explained by noise, or say too little.
+def too_little_said(found: Adjustment) -> str:
+    """Why the residuals say too little for a field: no final σ0, or too few of them; '' where they say enough."""
+    outcome, u = found.local.outcome, found.system.unknowns
+    if found.solution.status != "converged" or not outcome.sigma0 > 0.0:
+        return "the adjustment has no final σ0"
+    coordinates = 2 * NODES[0] * NODES[1] * len(np.unique(u.block.images.camera[u.images]))
+    return f"the redundancy is below {2 * coordinates}" if outcome.redundancy < 2 * coordinates else ""
 
-    Too little say those of an adjustment without an end, and fewer than twice as many as the field has nodes. A field
-    in a free block would depend on which coordinates hold it: there is none.
+
+def not_looked_for(found: Adjustment) -> str:
+    """Why no field is looked for although there may be one, '' where it is.
+
+    A field in a free block would depend on which coordinates hold it.
     """
+    u = found.system.unknowns
+    photographs, cameras = len(u.images), len(np.unique(u.block.images.camera[u.images]))
+    if u.block.settings.adjustment.is_free:
+        return "the datum of the block is free"
+    if cameras > MOST_CAMERAS:
+        return f"the block has {cameras} cameras, more than {MOST_CAMERAS}"
+    if photographs * cameras > MOST_PHOTOGRAPHS:
+        most = f"{MOST_PHOTOGRAPHS // cameras}" + (f" with {cameras} cameras" if cameras > 1 else "")
+        return f"the block has {photographs} photographs, more than {most}"
+    return ""
+
+
+def missing_in_sigma(found: Adjustment) -> str:
+    """A sentence where σ lacks what the parameters may leave of the errors of cameras, '' else.
+
+    None where the user has switched it off, or the residuals say too little to have a reason to fear it.
+    """
+    reason = not_looked_for(found)
+    if not reason or found.system.unknowns.block.settings.adjustment.model_part == "off" or too_little_said(found):
+        return ""
+    return f"{reason}: image errors that the additional parameters leave were not looked for and are not in σ"
+
+
+def camera_field(found: Adjustment) -> CameraField | None:
+    """The fields; None where the residuals are explained by noise, and for the reasons of the two functions above."""
+    if too_little_said(found) or not_looked_for(found):
+        return None
     system, solution, outcome = found.system, found.solution, found.local.outcome
     u = system.unknowns
-    cameras = np.unique(u.block.images.camera[u.images])
-    if solution.status != "converged" or not outcome.sigma0 > 0.0 or u.block.settings.adjustment.is_free:
-        return None
-    if len(cameras) > MOST_CAMERAS or len(u.images) * len(cameras) > LARGE:
-        return None
     factor = system.factorise(solution.equations)
     one = Clusters(CAMERA, np.zeros(len(u.images), np.int64), ("",), 1)
     equations = field_equations(system, solution, factor, one)
-    if outcome.redundancy < 2 * len(equations.scores):
-        return None
     gain, variance, noise, length = _most_likely(found, equations, outcome.sigma0**2 * outcome.redundancy)
     if np.exp(-0.5 * gain) >= LEVEL:
         return None
@@ -151,7 +184,7 @@ def camera_field(found: Adjustment) -> CameraField | None:
         gain,
         float(np.sqrt(noise)),
         nodes.reshape(len(equations.camera), 2, -1, nodes.shape[1]),
-        np.array([camera.half_format_mm for camera in u.block.cameras]),
+        half_formats(u.block.cameras),
         node_counts(u.block.cameras),
         part,
         by_unknowns,
@@ -163,11 +196,13 @@ def _known_nodes(equations: FieldEquations, prior: np.ndarray, noise: float) -> 
 
     Parameters
     ----------
-    prior : (nodes, nodes) mm², σ_s²·R. noise : σ0².
+    prior : (c, nodes, nodes) mm², σ_s²·R of the cameras of the block. noise : σ0².
     """
-    power, patterns = np.linalg.eigh(prior)
-    kept = power > KEPT * power[-1]
-    root = np.kron(np.eye(2 * len(equations.camera)), patterns[:, kept] * np.sqrt(power[kept]))
+    roots = np.repeat(roots_of_fields(prior)[equations.camera], 2, axis=0)
+    m, nodes, k = roots.shape
+    root = np.zeros((m, nodes, m, k))
+    root[np.arange(m), :, np.arange(m)] = roots
+    root = root.reshape(m * nodes, m * k)
     spread, scores = _seen(equations)
     along = spread.T @ root
     lower = np.linalg.cholesky(noise * np.eye(root.shape[1]) + along.T @ along)
@@ -184,22 +219,20 @@ def _seen(equations: FieldEquations) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _most_likely(found: Adjustment, equations: FieldEquations, squares: float) -> tuple[float, float, float, float]:
-    """Twice the gain of the logarithm of the likelihood, σ_s² mm², σ0², and length mm.
+    """Twice the gain of the logarithm of the likelihood, σ_s² mm², σ0², and ℓ.
 
     Parameters
     ----------
-    squares : vᵀPv.
+    squares : σ̂0² times the redundancy: vᵀPv, with a robust estimator that of so many observations of full weight.
     """
     u, redundancy = found.system.unknowns, found.local.outcome.redundancy
     cameras = u.block.cameras
     root, z = _seen(equations)
-    spread = root.reshape(2 * len(equations.camera), equations.nodes.count, -1)
-    unit, half = float(np.median(1.0 / u.rays.inv_sigma)), float(np.hypot(*half_format(cameras)))
-    sizes = (unit * SIZES) ** 2
-    best = (0.0, 0.0, squares / redundancy, half)
-    for length in half * np.array(LENGTHS):
+    sizes = (float(np.median(1.0 / u.rays.inv_sigma)) * SIZES) ** 2
+    best = (0.0, 0.0, squares / redundancy, 1.0)
+    for length in LENGTHS:
         r = correlations(cameras, length, True)
-        power, patterns = np.linalg.eigh(np.einsum("cip,ij,cjq->pq", spread, r, spread, optimize=True))
+        power, patterns = np.linalg.eigh(spread_of_fields(root, r[equations.camera]))
         grown = sizes[:, None] * np.maximum(power, 0.0)
         explained = np.sum((patterns.T @ z) ** 2 * grown / (1.0 + grown), axis=1)
         left = np.maximum(squares - explained, LEAST * squares)
@@ -207,5 +240,5 @@ def _most_likely(found: Adjustment, equations: FieldEquations, squares: float) -
         n = int(np.argmax(gains))
         if gains[n] > best[0]:
             noise = float(left[n]) / redundancy
-            best = (float(gains[n]), float(sizes[n]) * noise, noise, float(length))
+            best = (float(gains[n]), float(sizes[n]) * noise, noise, length)
     return best

@@ -2,8 +2,10 @@
 
 A variance of four strips has three degrees of freedom and says little. But the residuals of a strip show its errors
 over the whole format. [D] Cluster c has the image errors s_c = B·p_c, p_c its nodes over the format with the covariance
-σ_s²·R, R = exp(−ρ/ℓ) or exp(−ρ²/2ℓ²), dx and dy apart, and each camera of a rig its own. The scores h = BᵀPv have the
-covariance
+σ_s²·R, R = exp(−ρ/ℓ) or exp(−ρ²/2ℓ²), dx and dy apart, and each camera of a rig its own. ℓ is a share of the half
+diagonal of each camera's own format [C]: a lens, a sensor and a pressure plate are made for their format, so that their
+errors have as many waves over a small format as over a large one. σ_s is one length in mm for all cameras. The scores
+h = BᵀPv have the covariance
 
     σ0²·K + σ_s²·K·R·K,   K = BᵀPB − BᵀPA·Q·AᵀPB,
 
@@ -34,7 +36,7 @@ NODES = (7, 5)
 """Nodes along the longer and the shorter side of the format [C]: what orientation cannot take up is finer than a third
 of the format; finer than a sixth it does not bend a block."""
 LENGTHS = (0.2, 0.4, 0.8, 1.6, 3.2)
-"""Correlation lengths looked at, in half diagonals of the format."""
+"""Correlation lengths looked at, in half diagonals of each camera's format."""
 SIZES = np.geomspace(1e-2, 1e2, 161)
 """σ_s looked at, in σ of an image coordinate."""
 KEPT = 1e-3
@@ -49,9 +51,11 @@ class Field:
 
     Parameters
     ----------
-    sigma : mm. length : mm. smooth : whether R is exp(−ρ²/2ℓ²). gain : twice the logarithm of the likelihood with the
-        field over that without. ratio : RMS of the scores along the patterns of the field, over that of white noise.
-    freedom : rank of K. root : (nodes, k) of σ_s²·R.
+    sigma : mm. length : mm, in the largest format. smooth : whether R is exp(−ρ²/2ℓ²).
+    gain : twice the logarithm of the likelihood with the field over that without.
+    ratio : RMS of the scores along the patterns of the field, over that of white noise.
+    freedom : rank of K.
+    root : (c, nodes, k) of σ_s²·R of every camera of the block, the same for cameras of one format.
     """
 
     sigma: float
@@ -67,7 +71,7 @@ class Field:
 class FieldEquations:
     """What the rays say of the nodes of all clusters: sides (6n + s, k), normals K (k, k) and scores h (k,).
 
-    camera : (m,) of the parts, the photographs of one cluster and one camera, whose nodes they are.
+    camera : (m,) in the block, of the parts, the photographs of one cluster and one camera, whose nodes they are.
     """
 
     nodes: _kernels.Nodes
@@ -113,11 +117,12 @@ def root_of_field(
     """The columns F of the fields, see above, and F·Fᵀ of the points (P, 3, 3); in the inner datum if there is one."""
     u = system.unknowns
     equations = field_equations(system, solution, factor, clusters)
-    x = factor.solve(of_patterns(equations.sides, field.root))
+    root = field.root[equations.camera]
+    x = factor.solve(of_patterns(equations.sides, root))
     images, shared = x[: 6 * len(u.images)].reshape(len(u.images), 6, -1), x[6 * len(u.images) :]
     images = images * u.eo_free[:, :, None]
     points, squares = np.empty((len(u.points), 3, x.shape[1]), np.float32), np.zeros((len(u.points), 3, 3))
-    for own, columns in columns_of_points(system, solution, equations.nodes, field.root, x):
+    for own, columns in columns_of_points(system, solution, equations.nodes, root, x):
         points[:, :, own] = columns
         squares += columns @ np.swapaxes(columns, 1, 2)
     if inner is not None:
@@ -127,16 +132,26 @@ def root_of_field(
 
 
 def of_patterns(sides: np.ndarray, root: np.ndarray) -> np.ndarray:
-    """(6n + s, ·) sides of the patterns, root (nodes, k), from those of the nodes of all clusters."""
-    apart = sides.reshape(len(sides), -1, len(root)) @ root
-    return np.ascontiguousarray(apart.reshape(len(sides), -1))
+    """(6n + s, ·) sides of the patterns, root (m, nodes, k) of the parts, from those of the nodes of all of them."""
+    m, nodes, k = root.shape
+    apart = sides.reshape(len(sides), m, 2, nodes)
+    out = np.empty((len(sides), m, 2, k))
+    for own in alike(root):
+        by_node = apart[:, own].reshape(len(sides), -1, nodes)
+        out[:, own] = (by_node @ np.asfortranarray(root[own[0]])).reshape(len(sides), -1, 2, k)
+    return out.reshape(len(sides), -1)
 
 
 def columns_of_points(
     system: NormalSystem, solution: Settled, nodes: _kernels.Nodes, root: np.ndarray, x: np.ndarray
 ) -> Iterator[tuple[slice, np.ndarray]]:
-    """Some columns after others and the solutions of the points (P, 3, ·), from all of `of_patterns`, x (6n + s, ·)."""
-    u, k = system.unknowns, root.shape[1]
+    """Some columns after others and the solutions of the points (P, 3, ·), from all of `of_patterns`, x (6n + s, ·).
+
+    Parameters
+    ----------
+    root : (m, nodes, k) of the parts.
+    """
+    u, k = system.unknowns, root.shape[2]
     n, count = len(u.images), len(u.points)
     m, problem = x.shape[1] // (2 * k), system.problem(solution.state, solution.estimator)
     at_once = max(int(NUMBERS_AT_ONCE / (6 * max(count, 1) * k)), 1)
@@ -156,10 +171,11 @@ def _point_sides(
     inside = (nodes.label >= parts.start) & (nodes.label < parts.stop)
     share = np.where(inside[u.rays.image][:, None], nodes.weight, 0.0)
     here = nodes._replace(weight=share, label=np.where(inside, nodes.label - parts.start, 0))
-    sides = np.zeros((len(u.points), 3, 2 * root.shape[1] * (parts.stop - parts.start)))
+    own = np.ascontiguousarray(root[parts])
+    sides = np.zeros((len(u.points), 3, 2 * root.shape[2] * len(own)))
 
     def chunk(c: int) -> None:
-        _kernels.field_point_sides(*system.chunks[c], problem, here, root, sides, system.work())
+        _kernels.field_point_sides(*system.chunks[c], problem, here, own, sides, system.work())
 
     system.over_chunks(chunk)
     return sides
@@ -208,46 +224,87 @@ def by_camera(clusters: Clusters, camera: np.ndarray) -> tuple[np.ndarray, np.nd
 def nodes_of(system: NormalSystem, label: np.ndarray) -> _kernels.Nodes:
     """The rays among the nodes of their photograph's format, photographs with labels (n,)."""
     u, block = system.unknowns, system.unknowns.block
-    half = np.array([camera.half_format_mm for camera in block.cameras])[block.images.camera[u.images]][u.rays.image]
-    counts = node_counts(block.cameras)
-    return _kernels.Nodes(*nodes_at(u.rays.xy, half, counts), label, counts[0] * counts[1])
+    camera = block.images.camera[u.images][u.rays.image]
+    half, counts = half_formats(block.cameras)[camera], node_counts(block.cameras)[camera]
+    return _kernels.Nodes(*nodes_at(u.rays.xy, half, counts), label, NODES[0] * NODES[1])
 
 
-def nodes_at(xy: np.ndarray, half: np.ndarray, counts: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+def nodes_at(xy: np.ndarray, half: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(r, 4) nodes about image places (r, 2) mm and their bilinear weights.
 
     Parameters
     ----------
-    half : (r, 2) mm, half the format. counts : nodes along x and y.
+    half : (r, 2) mm, half the format. counts : (r, 2) nodes along x and y.
     """
-    number = np.array(counts)
-    at = np.clip(0.5 * (xy / half + 1.0), 0.0, 1.0) * (number - 1)
-    low = np.minimum(at.astype(np.int64), number - 2)
+    at = np.clip(0.5 * (xy / half + 1.0), 0.0, 1.0) * (counts - 1)
+    low, along_y = np.minimum(at.astype(np.int64), counts - 2), counts[:, 1:]
     x, y = (at - low).T
-    node = low[:, :1] * number[1] + low[:, 1:] + np.array([0, 1, number[1], number[1] + 1])
+    corners = np.concatenate([0 * along_y, 0 * along_y + 1, along_y, along_y + 1], axis=1)
+    node = low[:, :1] * along_y + low[:, 1:] + corners
     weight = np.column_stack([(1.0 - x) * (1.0 - y), (1.0 - x) * y, x * (1.0 - y), x * y])
     return node, weight
 
 
-def node_counts(cameras: Sequence[Camera]) -> tuple[int, int]:
-    """Nodes along x and y."""
-    half = half_format(cameras)
-    return NODES if half[0] >= half[1] else (NODES[1], NODES[0])
+def node_counts(cameras: Sequence[Camera]) -> np.ndarray:
+    """(c, 2) nodes along x and y of every camera."""
+    half = half_formats(cameras)
+    return np.where(half[:, :1] >= half[:, 1:], NODES, NODES[::-1])
 
 
-def half_format(cameras: Sequence[Camera]) -> np.ndarray:
-    """(2,) mm, of the largest camera."""
-    return np.max([camera.half_format_mm for camera in cameras], axis=0)
+def half_formats(cameras: Sequence[Camera]) -> np.ndarray:
+    """(c, 2) mm, half the formats."""
+    return np.array([camera.half_format_mm for camera in cameras])
 
 
-def correlations(cameras: Sequence[Camera], length: float, smooth: bool) -> np.ndarray:
-    """(nodes, nodes) R for a length in mm."""
-    axes = [
-        half * np.linspace(-1.0, 1.0, k) for half, k in zip(half_format(cameras), node_counts(cameras), strict=True)
-    ]
+def largest_half_diagonal(cameras: Sequence[Camera]) -> float:
+    """Half the diagonal of the largest format, mm."""
+    return max(camera.r_max_mm for camera in cameras)
+
+
+def correlations(cameras: Sequence[Camera], share: float, smooth: bool) -> np.ndarray:
+    """(c, nodes, nodes) R of every camera for ℓ as a share of the half diagonal of its format."""
+    return np.stack([_correlations(camera, share * camera.r_max_mm, smooth) for camera in cameras])
+
+
+def _correlations(camera: Camera, length: float, smooth: bool) -> np.ndarray:
+    """(nodes, nodes) R of a camera for ℓ in mm."""
+    counts = node_counts([camera])[0]
+    axes = [half * np.linspace(-1.0, 1.0, k) for half, k in zip(camera.half_format_mm, counts, strict=True)]
     xy = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     squares = np.sum((xy[:, None] - xy) ** 2, axis=2) / length**2
     return np.exp(-0.5 * squares) if smooth else np.exp(-np.sqrt(squares))
+
+
+def alike(matrices: np.ndarray) -> list[np.ndarray]:
+    """The numbers of those of (m, ·, ·) matrices that are equal, for every different one."""
+    _, number = np.unique(matrices.reshape(len(matrices), -1), axis=0, return_inverse=True)
+    return [np.flatnonzero(number.ravel() == k) for k in range(int(number.max(initial=-1)) + 1)]
+
+
+def spread_of_fields(root: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """(q, q) rootᵀ·R·root with R of every part in either component.
+
+    Parameters
+    ----------
+    root : (2·m·nodes, q) of K. r : (m, nodes, nodes) R of the parts.
+    """
+    m, nodes, _ = r.shape
+    apart = root.reshape(m, 2, nodes, -1)
+    sums = []
+    for own in alike(r):
+        spread = apart[own].reshape(2 * len(own), nodes, -1)
+        sums.append(np.einsum("cip,ij,cjq->pq", spread, r[own[0]], spread, optimize=True))
+    return np.sum(sums, axis=0)
+
+
+def roots_of_fields(prior: np.ndarray) -> np.ndarray:
+    """(c, nodes, k) roots of σ_s²·R (c, nodes, nodes), patterns of little size left out.
+
+    Of formats of different shape one may need fewer patterns than another; all have as many as the one with most.
+    """
+    power, patterns = np.linalg.eigh(prior)
+    first = int(np.min(np.argmax(power > KEPT * power[:, -1:], axis=1)))
+    return patterns[:, :, first:] * np.sqrt(np.maximum(power[:, None, first:], 0.0))
 
 
 def fitted_field(system: NormalSystem, solution: Solution, factor: Factor, sigma0: float, clusters: Clusters) -> Field:
@@ -279,13 +336,11 @@ def fit_field(
     there = values > SAME * values[-1]
     root, freedom = vectors[:, there] * np.sqrt(values[there]), int(there.sum())
     z = (vectors[:, there].T @ scores) / np.sqrt(values[there]) / sigma0
-    nodes, half = len(scores) // (2 * len(camera)), float(np.hypot(*half_format(cameras)))
     best, sizes = None, (unit * SIZES) ** 2
     for smooth in (False, True):
         for length in LENGTHS:
-            r = correlations(cameras, half * length, smooth)
-            spread = root.reshape(2 * len(camera), nodes, -1)
-            power, patterns = np.linalg.eigh(np.einsum("cip,ij,cjq->pq", spread, r, spread, optimize=True) / sigma0**2)
+            r = correlations(cameras, length, smooth)
+            power, patterns = np.linalg.eigh(spread_of_fields(root, r[camera]) / sigma0**2)
             power, squares = np.maximum(power, 0.0), (patterns.T @ z) ** 2
             grown = sizes[:, None] * power
             gains = np.sum(squares * grown / (1.0 + grown) - np.log1p(grown), axis=1)
@@ -295,11 +350,9 @@ def fit_field(
                 best = float(gains[k]), sizes[k], length, smooth, ratio, r
     assert best is not None
     gain, variance, length, smooth, ratio, r = best
-    power, patterns = np.linalg.eigh(variance * r)
-    kept = power > KEPT * power[-1]
     return Field(
-        float(np.sqrt(variance)), half * length, smooth, max(gain, 0.0), ratio, freedom,
-        patterns[:, kept] * np.sqrt(power[kept]),
+        float(np.sqrt(variance)), largest_half_diagonal(cameras) * length, smooth, max(gain, 0.0), ratio, freedom,
+        roots_of_fields(variance * r),
     )  # fmt: skip
 
 

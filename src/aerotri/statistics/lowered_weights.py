@@ -81,7 +81,8 @@ def lowered_sides(
 ) -> np.ndarray:
     """t·N_c·y_c of all m clusters with the points eliminated, (6·n + s, m), from y (6·n + s, m).
 
-    Without y the scores g_c, with the points eliminated from N − t·N_c.
+    Without y the scores g_c, with the points eliminated from N − t·N_c. Of the other observations those of one
+    photograph each are in N_c; those without a photograph, and what ties the cameras of a rig, keep their weights.
 
     Parameters
     ----------

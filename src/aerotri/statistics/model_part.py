@@ -143,20 +143,20 @@ def why_none(tests: Sequence[ClusterTest]) -> str:
 
 def excess_of_clusters(
     system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters, sigma0: float,
-    q_images: np.ndarray, q_shared: np.ndarray, q_points: np.ndarray, inner: InnerDatum | None = None,
+    q: tuple[np.ndarray, np.ndarray, np.ndarray], inner: InnerDatum | None = None,
 ) -> Excess:  # fmt: skip
     """The model part.
 
     Parameters
     ----------
     factor : undamped, at the solution; invalid afterwards.
-    q_images (n, 6, 6) in rotation unknowns, q_shared (s, s), q_points (P, 3, 3) : cofactors.
+    q : cofactors of photographs (n, 6, 6) in rotation unknowns, of shared parameters (s, s), and of points (P, 3, 3).
     inner : the inner datum of all of them, None where there is none.
     """
-    m = len(clusters)
+    m, (q_images, q_shared, q_points) = len(clusters), q
     widening = of_few(m)
     known = known_part(system, solution, factor, inner=inner)
-    noise = [q - part for q, part in zip((q_images, q_shared, q_points), known, strict=True)]
+    noise = [one - part for one, part in zip(q, known, strict=True)]
     root = ModelRoot(
         np.empty((*q_images.shape[:2], m)), np.empty((len(q_shared), m)), np.empty((len(q_points), 3, m), np.float32),
         widening * sigma0**2,

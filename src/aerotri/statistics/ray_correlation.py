@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from aerotri.adjustment.ray_status import RayStatus
+from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.observations import Block
 from aerotri.quantiles import student_exceedance
 from aerotri.results.adjusted_block import RayResults
@@ -82,7 +83,7 @@ def _normalised(rays: RayResults) -> np.ndarray:
         known = np.isfinite(z[:, axis])
         if known.any():
             own = z[known, axis] - np.median(z[known, axis])
-            scale = 1.4826 * np.median(np.abs(own))
+            scale = SIGMA_PER_MAD * np.median(np.abs(own))
             own = np.clip(own / scale, -CLIP, CLIP) if scale > 0.0 else np.zeros_like(own)
             z[known, axis] = own / max(float(np.sqrt(np.mean(own**2))), 1e-300)
     return z

@@ -23,12 +23,15 @@ from aerotri.rasters.between_places import between_places, lattice_of, spread_pl
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.camera_field import CameraField, is_of_camera
 from aerotri.statistics.covariance import inner_datum, is_inner
+from aerotri.statistics.image_sigma import weight_of_cameras
 from aerotri.statistics.model_of_functions import model_of_functions
 from aerotri.terrain.pickets import Pickets
 
 MOST_PLACES, AT_A_TIME = 500, 100
 """Pickets whose variance is computed, the others interpolated, and how many at a time; chosen [C]: this variance
 changes slowly over a block, and 100 at a time, 300 columns of the inverse, fit into memory."""
+ELEMENTS = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
+"""XX, YY, ZZ, XY, XZ, YZ of a matrix."""
 RAYS_AT_A_TIME = 50_000
 """Rays whose partials are computed at a time: 400 bytes each."""
 
@@ -243,11 +246,11 @@ def _linearised(
     )  # fmt: skip
 
 
-def _gain(by_point: np.ndarray, picket: np.ndarray, count: int) -> np.ndarray:
-    """(r, 3, 2) of rays, by which the points that they intersect in move."""
-    normal = np.zeros((count, 3, 3))
-    np.add.at(normal, picket, np.einsum("rki,rkj->rij", by_point, by_point))
-    return np.linalg.solve(normal[picket], np.swapaxes(by_point, 1, 2))
+def _gain(by_point: np.ndarray, weight: np.ndarray, picket: np.ndarray, count: int) -> np.ndarray:
+    """(r, 3, 2) of rays with weights (r,), by which the points that they intersect in move."""
+    normal, weighted = np.zeros((count, 3, 3)), by_point * weight[:, None, None]
+    np.add.at(normal, picket, np.einsum("rki,rkj->rij", weighted, by_point))
+    return np.linalg.solve(normal[picket], np.swapaxes(weighted, 1, 2))
 
 
 def _gain_in_plan(by_point: np.ndarray) -> np.ndarray:
@@ -271,7 +274,9 @@ def _by_unknowns(
     picket, column = np.nonzero(photographs >= 0)
     image = rows[photographs[picket, column]]
     rays = _linearised(restitution.true, local, image, picket, u.lens.base.shape[1])
-    gain = _gain_in_plan(rays.by_point) if plan else _gain(rays.by_point, picket, len(local))
+    camera = calibration.local.block.images.camera[image]
+    weight = weight_of_cameras(calibration)[camera]
+    gain = _gain_in_plan(rays.by_point) if plan else _gain(rays.by_point, weight, picket, len(local))
     own = in_system[image]
     by_image = rays.by_orientation.copy()
     by_image[:, :, 3:] = rays.by_orientation[:, :, 3:] @ u.turn(state)[own]
@@ -281,6 +286,29 @@ def _by_unknowns(
     effect = -gain @ by_image
     for k in range(6):
         np.add.at(j, (picket[:, None], np.arange(3), 6 * own[:, None] + k), effect[:, :, k])
+    measured = _add_shared(calibration, restitution, rays, gain, picket, image, j)
+    left = restitution.left
+    if left is None:
+        return j
+    by_errors = np.zeros((len(local), 3, left.by_unknowns.shape[1]))
+    np.add.at(by_errors, picket, left.moved(gain, measured, camera))
+    return np.concatenate([j, by_errors], axis=2)
+
+
+def _add_shared(
+    calibration: Adjustment, restitution: Restitution, rays: RayPartials, gain: np.ndarray, picket: np.ndarray,
+    image: np.ndarray, j: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Add the partials by the shared unknowns to those of `_by_unknowns`; (r, 2) mm, where the rays were measured.
+
+    Parameters
+    ----------
+    gain : (r, 3, 2) of the rays, picket (r,) their points, image (r,) their photographs in the block.
+    """
+    u = calibration.system.unknowns
+    in_system = np.full(len(restitution.group), -1)
+    in_system[u.images] = np.arange(len(u.images))
+    own = in_system[image]
     first_shared = 6 * len(u.images)
     free = u.lens.columns[u.lens.of_image][own][:, :3]
     for k in range(3):
@@ -301,10 +329,4 @@ def _by_unknowns(
                 e = -gain[has] @ errors.partials(measured[has])
                 for k, col in enumerate(columns.tolist()):
                     np.add.at(j, (picket[has][:, None], np.arange(3), first_shared + col), e[:, :, k])
-    left = restitution.left
-    if left is None:
-        return j
-    by_errors = np.zeros((len(local), 3, left.by_unknowns.shape[1]))
-    camera = calibration.local.block.images.camera[image]
-    np.add.at(by_errors, picket, left.moved(gain, measured, camera))
-    return np.concatenate([j, by_errors], axis=2)
+    return measured

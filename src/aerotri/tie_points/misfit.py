@@ -47,8 +47,10 @@ def with_sigma_of_ties(block: Block, offset_px: np.ndarray, ties: int) -> tuple[
     return found, float(np.median(sigma[used] / pixel[used, None]))
 
 
-def adjusted_offsets(local: Block, points: np.ndarray, offset_px: np.ndarray) -> np.ndarray:
-    """(m, 2) px, measured less predicted after some steps of the adjustment; as given where it leads nowhere.
+def adjusted_offsets(local: Block, points: np.ndarray, offset_px: np.ndarray) -> tuple[np.ndarray, str]:
+    """(m, 2) px, measured less predicted after some steps of the adjustment, and a sentence where it leads nowhere.
+
+    The offsets are then those given, and their misfit contains the errors of the start values.
 
     Parameters
     ----------
@@ -60,15 +62,24 @@ def adjusted_offsets(local: Block, points: np.ndarray, offset_px: np.ndarray) ->
         unknowns = prepared.system.unknowns
         redundancy = max(2 * len(unknowns.rays.source) - unknowns.count, 1)
         found = minimise(prepared.system, prepared.state, redundancy, SolveOptions(STEPS, "huber"))
-    except (InputError, np.linalg.LinAlgError):
-        return offset_px
+    except InputError as error:
+        return offset_px, _as_given(error.message)
+    except np.linalg.LinAlgError:
+        return offset_px, _as_given("the equations cannot be solved")
     residual = found.equations.residual
     if found.defects or not np.isfinite(residual).all():
-        return offset_px
+        return offset_px, _as_given("the image points do not determine all unknowns")
     pixel = np.array([camera.pixel_mm for camera in local.cameras])[local.images.camera[local.image_points.image]]
     after, rows = offset_px.copy(), unknowns.rays.source
     after[rows] = residual / pixel[rows, None]
-    return after
+    return after, ""
+
+
+def _as_given(why: str) -> str:
+    return (
+        f"the standard deviation of tie points contains errors of the first orientation, because it could not be "
+        f"adjusted: {why}"
+    )
 
 
 def without_smooth_part(offset: np.ndarray, xy: np.ndarray, image: np.ndarray) -> np.ndarray:

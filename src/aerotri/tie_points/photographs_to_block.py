@@ -120,7 +120,7 @@ def tie_photographs(
     frame = oriented.frame
     found = reproject(*in_frame(reading.block, frame))
     local = reading.block if frame is None else transform_block(reading.block, frame)
-    offset_px = adjusted_offsets(local, found.points, found.offset_px)
+    offset_px, unsettled = adjusted_offsets(local, found.points, found.offset_px)
     block, sigma_px = with_sigma_of_ties(reading.block, offset_px, len(tracks))
     points = found.points if frame is None else frame.from_local(found.points)
     reading = with_unmarked_control(replace(reading, block=block, points=points), given)
@@ -134,6 +134,7 @@ def tie_photographs(
             *reading.messages,
             *oriented.messages,
             f"the standard deviation of tie points is {sigma_px:.2f} px, as they fit one another",
+            *((unsettled,) if unsettled else ()),
         ),
     )
 

@@ -6,16 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import shapely
 
 from aerotri.conventions import in_digits
 from aerotri.volume.bases import Base, PlaneBase, SplineBase, Surface, integral_of_spline, quadrature_of, sampled
-from aerotri.volume.boundary import Boundary, boundary_of
+from aerotri.volume.boundary import Boundary
+from aerotri.volume.ground_around import ground_around
 from aerotri.volume.parts import Part
 from aerotri.volume.rectified import LINE, NO_LINE, Line
 from aerotri.volume.regions import Region
 from aerotri.volume.response import Systematic, systematic
-from aerotri.volume.roughness import roughness_of_cells
 from aerotri.volume.settings import SigmaOptions
 from aerotri.volume.shared import (
     both_between,
@@ -26,23 +25,14 @@ from aerotri.volume.shared import (
     shared_in_words,
     summed_part,
 )
-from aerotri.volume.sums import cells_within
 
 ALONG_EDGE = 33
 """Places along every edge of the boundary."""
-RING_SHARE = 0.3
-"""Width of the ring of ground outside the boundary that a base is judged by, over the root of the boundary's area."""
-RING_STEPS = 9
-"""Steps across the ring: the wider contrasts reach over eight of them."""
-MOST_RING_CELLS = 4_000_000
-"""Cells around the ring outside a boundary that are read at most; chosen [C]: 32 MB; larger areas keep the σ stated for
-the base."""
-SMOOTHEST_BELOW = 0.9
-"""Exponent of the ground under a spline at most: what a ring shows as smooth need not be so far inwards."""
 PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")
 MOVES = "the boundary is taken as drawn on the surface: a shift or turn of the whole block moves both"
 MODEL = "model"
-"""The part beside these where groups of photographs share errors: the model part of the adjustment."""
+"""The part beside these of image errors that photographs share: those of a group, and those that the additional
+parameters leave in all photographs of a camera."""
 LASTING = "matching_shared"
 """The part beside these of dense surfaces: errors of the matching that do not average out."""
 
@@ -144,10 +134,12 @@ def volume_sigma(
         share, by name and value, by their covariance.
     """
     region = part.region
-    ground = base_variance(base, boundary, surface, options, region)
+    below = spline_variance(base, boundary, surface, region)
+    stated = options.base_sigma * (boundary.area if region is None else region.area)
+    ground = stated**2 + (below or 0.0)
     sign = 0 if region is None else region.sign
     edge = boundary_variance(surface, base, boundary, options.boundary_sigma, sign)
-    notes = _notes(part, base_part, base, ground, options)
+    notes = _notes(part, base_part, base, below is not None, options)
     beside = _Beside(ground, edge, notes, region.line if region is not None and sign else None)
     return _assembled(part, base_part, beside, options)
 
@@ -295,38 +287,24 @@ def boundary_variance(surface: Surface, base: Base, boundary: Boundary, sigma: f
     return sigma**2 * total
 
 
-def base_variance(
-    base: Base, boundary: Boundary, surface: Surface, options: SigmaOptions, region: Region | None = None
-) -> float:
-    """m⁶, of the base: what is stated for it, and for a spline how rough the ground around suggests it is below.
+def spline_variance(base: Base, boundary: Boundary, surface: Surface, region: Region | None = None) -> float | None:
+    """m⁶, of what a spline leaves out of the ground below it, from the ground around.
 
+    None where the base is no spline, or too little ground is known around it.
+
+    Parameters
+    ----------
     region : what counts of the boundary; None: all.
     """
-    stated = (options.base_sigma * (boundary.area if region is None else region.area)) ** 2
-    if not isinstance(base, SplineBase):
-        return stated
-    width = RING_SHARE * np.sqrt(boundary.area)
-    ring = boundary_of(shapely.difference(boundary.outline.buffer(width), boundary.outline), "ring")
-    row, column, rows, columns = cells_within(surface.grid, ring)
-    if rows * columns > MOST_RING_CELLS:
-        return stated
-    # contrasts as wide as the ring allows: the base is interpolated over far more than a cell
-    step = max(1, int(width / (RING_STEPS * min(surface.grid.cell_x, surface.grid.cell_y))))
-    z = surface.read(row, column, rows, columns).astype(float)
-    z[ring.coverage(surface.grid.window(row, column, rows, columns)) < 0.5] = np.nan
-    roughness = roughness_of_cells(z, surface.grid, step, SMOOTHEST_BELOW)
-    while roughness is None and step > 1:
-        step //= 2
-        roughness = roughness_of_cells(z, surface.grid, step, SMOOTHEST_BELOW)
-    if roughness is None:
-        return stated
+    around = ground_around(base, boundary, surface) if isinstance(base, SplineBase) else None
+    if around is None or not isinstance(base, SplineBase):
+        return None
     places, weight = quadrature_of(boundary) if region is None else (region.places, region.weight)
     integral = base.integral if region is None else integral_of_spline(base, places, weight)
-    xy = np.concatenate([places, base.xy])
-    return stated + max(float(roughness.contrast_variance(xy, np.concatenate([weight, -integral]))), 0.0)
+    return around.contrast_variance(np.concatenate([places, base.xy]), np.concatenate([weight, -integral]))
 
 
-def _notes(part: Part, base_part: Part | None, base: Base, ground: float, options: SigmaOptions) -> tuple[str, ...]:
+def _notes(part: Part, base_part: Part | None, base: Base, judged: bool, options: SigmaOptions) -> tuple[str, ...]:
     notes = []
     if part.unseen > 0.0:
         unseen = f"{in_digits(part.unseen, 4)} m² are seen by too few photographs of the block"
@@ -336,8 +314,8 @@ def _notes(part: Part, base_part: Part | None, base: Base, ground: float, option
     if base_part is None and not isinstance(base, PlaneBase | SplineBase) and options.base_sigma <= 0.0:
         notes.append("the base counts as free of error: give its σ with --base-adjustment or --base-sigma")
     if isinstance(base, SplineBase):
-        judged = "the base is judged by how rough the ground outside the boundary is, carried inwards"
-        notes.append(judged if ground > 0.0 else "too little ground outside the boundary to judge the base by")
+        said = "the base is judged by the ground outside the boundary, taken for of the same kind as the ground below"
+        notes.append(said if judged else "too little ground outside the boundary to judge the base by")
     if isinstance(base, PlaneBase) and base.nodes is None and options.base_sigma <= 0.0:
         notes.append(f"the base ({base.name}) counts as free of error: give its σ with --base-sigma")
     if options.boundary_from == "product":

@@ -43,6 +43,7 @@ class Boundary:
     polygon : valid shapely geometry. name : where it came from. note : about its CRS, '' where there is nothing to say.
     piles : names and polygons that count one by one; empty where the boundary is one.
     polygon_name : that a file gives its only polygon, '' where it gives none.
+    beside : other polygons that are measured at the same time: no ground around this one.
     """
 
     polygon: BaseGeometry
@@ -50,6 +51,7 @@ class Boundary:
     note: str = ""
     piles: tuple[tuple[str, BaseGeometry], ...] = ()
     polygon_name: str = ""
+    beside: BaseGeometry | None = None
 
     @property
     def area(self) -> float:

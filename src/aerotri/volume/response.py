@@ -237,7 +237,7 @@ def systematic(calibration: Adjustment, response: Response, variant: str = "free
 
 def _summed(
     calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, photos: _kernels.PhotoArrays, nodes: ErrorNodes
-):
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, np.ndarray, float]:
     """Sums over the pickets, in threads: by orientation, by interior elements, at the nodes, the noise, by shared
     unknowns of rolling shutters, and what these do where they are left uncorrected."""
     u = calibration.system.unknowns

@@ -22,9 +22,12 @@ from aerotri.report.documents.parts import (
     table,
 )  # fmt: skip
 from aerotri.report.documents.picture_texts import in_language, picture_line
+from aerotri.report.documents.words import Words
 from aerotri.report.plots.block import plot_block_plan, plot_ground_points
 from aerotri.report.plots.canvas import axes_at, new_figure, write_name
 from aerotri.report.plots.rendering import render_plots
+from aerotri.report.plots.volume import WORDS
+from aerotri.volume.accuracy import MODEL
 from synthetic import make_adjusted_block
 
 NAMES = re.compile(r"(C|K|T|CP|P)?\d+|surface|cone.*|[a-z]+_?\d*")
@@ -151,3 +154,14 @@ def test_a_signature_is_never_alone_on_its_page():
         seen.add(len(pages))
     # the break falls everywhere between these
     assert len(seen) > 1
+
+
+def test_the_part_that_photographs_share_names_no_groups_alone():
+    """It holds what the parameters leave of a camera too: pictures and certificate say so, in both languages."""
+    german = picture_line(WORDS[MODEL], "de")
+    assert german is not None
+    said = WORDS[MODEL], german, Words("en")("part.model"), Words("de")("part.model")
+    for text in said:
+        assert "image errors" in text or "Bildfehler" in text
+        assert "group" not in text.lower()
+        assert "grupp" not in text.lower()

@@ -92,7 +92,7 @@ def _records(part: SurfacePoints, header: LasHeader) -> np.ndarray:
 
 def _surface_fields(part: SurfacePoints) -> tuple[np.ndarray, ...]:
     """Values of `SURFACE_FIELDS`, (n,) each."""
-    xx, xy, xz, yy, yz, zz = part.covariance.T
+    xx, yy, zz, xy, xz, yz = part.covariance.T
     return (
         *part.normal.T, *(np.sqrt(np.maximum(v, 0.0)) for v in (xx, yy, zz)), xy, xz, yz, part.matching,
         part.photographs,

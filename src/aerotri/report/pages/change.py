@@ -19,7 +19,7 @@ CAPTION = (
 )
 NOTHING = "no cell is beyond the level of detection"
 PARTS = {
-    "adjustment": "adjustments", "model": "model part of the adjustments",
+    "adjustment": "adjustments", "model": "image errors that photographs share",
     "matching_shared": "matching errors that neighbouring cells share",
 }  # fmt: skip
 UNKNOWNS = {

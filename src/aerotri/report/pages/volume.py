@@ -84,7 +84,7 @@ def _budget(c: Mapping[str, Any]) -> str:
         return ""
     largest = max(s["parts_m3"], key=s["parts_m3"].get)
     shared = {
-        MODEL: "errors that groups of photographs share",
+        MODEL: "image errors that photographs share",
         LASTING: "matching errors that neighbouring cells share",
     }
     largest = shared.get(largest, largest)

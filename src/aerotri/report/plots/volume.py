@@ -49,7 +49,7 @@ COLOURS = LinearSegmentedColormap.from_list("cut_and_fill", [FILL, "#8fb4d6", "#
 )
 WORDS = {
     "adjustment": "adjustment (orientation, self-calibration; all heights correlated)",
-    MODEL: "errors that groups of photographs share",
+    MODEL: "image errors that photographs share",
     "matching": "matching of the points",
     LASTING: "matching, errors that neighbouring cells share",
     "interpolation": "ground between the points",

@@ -22,7 +22,7 @@ class SurfacePoints:
 
     Parameters
     ----------
-    xyz : (n, 3) m. covariance : (n, 6) m², XX, XY, XZ, YY, YZ, ZZ. matching : (n,) m, σ of Z of matching alone.
+    xyz : (n, 3) m. covariance : (n, 6) m², XX, YY, ZZ, XY, XZ, YZ. matching : (n,) m, σ of Z of matching alone.
     photographs : (n,) how many measured it. normal : (n, 3) of length 1, upwards.
     colour : (n, 3) uint16 red, green, blue. ground : (n,) bool, whether each is ground.
     """
@@ -57,7 +57,7 @@ def surface_points(outcome: DenseOutcome, ground: BareGround | None = None) -> I
         xyz = np.column_stack([grid.x(column), grid.y(row), tile.z[row, column]])
         matching = tile.sigma[row, column].astype(float)
         covariance = o.shared.covariances(grid)[row, column]
-        covariance[:, 5] += matching**2
+        covariance[:, 2] += matching**2
         yield SurfacePoints(
             xyz, covariance, matching, tile.count[row, column], normals(tile.z, grid)[row, column],
             colours.of(xyz, tile.shown_by[row, column]),

@@ -9,7 +9,7 @@ import numpy as np
 from aerotri.rasters.between_places import between_places
 from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
-from aerotri.terrain.adjustment_part import covariances_at
+from aerotri.terrain.adjustment_part import ELEMENTS, covariances_at
 from aerotri.terrain.photographs import Photographs
 
 NODES = 60
@@ -18,7 +18,7 @@ NODES = 60
 
 @dataclass(frozen=True, eq=False)
 class SharedPart:
-    """Covariances on a coarse grid: (rows, columns, 6) m², XX, XY, XZ, YY, YZ, ZZ, on x rising and y falling."""
+    """Covariances on a coarse grid: (rows, columns, 6) m² as `ELEMENTS`, on x rising and y falling."""
 
     x: np.ndarray
     y: np.ndarray
@@ -26,7 +26,7 @@ class SharedPart:
 
     def over(self, grid: Grid) -> np.ndarray:
         """(rows, columns) m, σ of Z of the cells of a grid, bilinear."""
-        return np.sqrt(self.covariances(grid, slice(5, 6))[:, :, 0])
+        return np.sqrt(self.covariances(grid, slice(2, 3))[:, :, 0])
 
     def covariances(self, grid: Grid, chosen: slice = slice(None)) -> np.ndarray:
         """(rows, columns, k) m² of the cells of a grid, bilinear; which of the six may be chosen."""
@@ -56,7 +56,7 @@ def shared_part(
     for n, own in enumerate(measured):
         chosen[n, : len(own)] = own
     covariance = covariances_at(calibration, photographs.restitution, rows, places, chosen)
-    six = covariance[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+    six = covariance[:, *ELEMENTS]
     low, high = places[:, :2].min(axis=0), places[:, :2].max(axis=0)
     high = np.maximum(high, low + 1e-3)
     x, y = np.linspace(low[0], high[0], NODES), np.linspace(high[1], low[1], NODES)

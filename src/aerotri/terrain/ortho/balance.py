@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.terrain.ortho.candidates import Candidates
 
 GAIN_SIGMA, OFFSET_SIGMA = 0.3, 0.05
@@ -97,7 +98,7 @@ def _spread(differences: list[np.ndarray]) -> float:
     every = max(sum(d.size for d in differences) // 1_000_000, 1)
     known = np.concatenate([d.ravel()[::every] for d in differences])
     known = known[np.isfinite(known)]
-    return float(1.4826 * np.median(np.abs(known))) if len(known) else float("nan")
+    return float(SIGMA_PER_MAD * np.median(np.abs(known))) if len(known) else float("nan")
 
 
 def _sums(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.terrain.ortho import _seam_kernels as kernels
 from aerotri.terrain.ortho.candidates import Candidates
 
@@ -56,7 +57,7 @@ def choose(candidates: Candidates, colours: np.ndarray, move: bool = True) -> Ch
 
 def _moved(candidates: Candidates, colours: np.ndarray) -> np.ndarray:
     found = candidates.found
-    spread = 1.4826 * np.nanmedian(np.abs(colours[0] - colours[1])) if (found[1] >= 0).any() else 0.0
+    spread = SIGMA_PER_MAD * np.nanmedian(np.abs(colours[0] - colours[1])) if (found[1] >= 0).any() else 0.0
     scaled = np.nan_to_num(colours / np.float32(max(spread, 1e-4))).astype(np.float32)
     unary = np.ascontiguousarray(np.moveaxis(_own_cost(candidates), 0, -1))
     shape = (*found.shape[1:], len(found), len(found))

@@ -20,7 +20,7 @@ from aerotri.rasters.between_places import between_places, spread_places
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.camera_field import known_field
 from aerotri.statistics.image_sigma import image_sigma_of_cameras
-from aerotri.terrain.adjustment_part import change_covariances, covariances_at, solved_partials
+from aerotri.terrain.adjustment_part import ELEMENTS, change_covariances, covariances_at, solved_partials
 from aerotri.volume.change.adjusted import in_common
 from aerotri.volume.change.clouds import Cloud, CloudDistances, quadratic
 from aerotri.volume.parts import Measured, Part
@@ -33,8 +33,6 @@ PLACES = 6
 """Places along a side at which covariances are found [C]: deformations of a block change over tenths of a model."""
 NAMES = ("the first cloud", "the second cloud")
 UP = np.array([0.0, 0.0, 1.0])
-ELEMENTS = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
-"""XX, YY, ZZ, XY, XZ, YZ of a matrix."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import KDTree
 
-LEVEL = 1.959964
+from aerotri.conventions import SIGMAS_OF_95
+
+LEVEL = SIGMAS_OF_95
 """Standard deviations of 95 %."""
 FEWEST = 4
 """Points of a cloud in a cylinder, or about a normal, from which there is a distance [C]."""

@@ -14,13 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.conventions import SIGMAS_OF_95
 from aerotri.rasters.grids import Grid
 from aerotri.volume.change.adjusted import AdjustedPair, AlignedPair
 from aerotri.volume.change.alignment import NO_ALIGNMENT, Align, Alignment, align
 from aerotri.volume.change.noise import variance_of_sum
 from aerotri.volume.lasting import NO_LASTING, Lasting, lasting_variance_of_cells
 
-LEVEL = 1.959963985
+LEVEL = SIGMAS_OF_95
 """Of 95 %: changes beyond so many σ are told from noise."""
 PARTS = ("noise", "alignment", "adjustment", "model", "matching_shared")
 
