@@ -16,7 +16,7 @@ from aerotri.rasters.grids import Grid
 from aerotri.rasters.images import create_image
 from aerotri.terrain.adjustment_part import covariances_at
 from aerotri.terrain.dense import _mesh_kernels as kernels
-from aerotri.terrain.dense import epipolar, parallaxes
+from aerotri.terrain.dense import epipolar, parallaxes, spline
 from aerotri.terrain.dense._refinement_kernels import shift_windows
 from aerotri.terrain.dense._resampling_kernels import align, move_rows, resample
 from aerotri.terrain.dense.cell_scale import CellScale
@@ -313,12 +313,61 @@ def test_sigma_grows_where_only_a_part_of_the_window_matches():
 
 def test_resampling_keeps_straight_lines_and_parabolas():
     row, column = np.mgrid[:40, :50].astype(float)
-    x, y = np.random.default_rng(6).uniform(3.0, 36.0, (2, 30, 30)).astype(np.float32)
+    x, y = np.random.default_rng(6).uniform(8.0, 31.0, (2, 30, 30)).astype(np.float32)
     out = np.empty((30, 30), np.float32)
     for grey in (3.0 * column - 2.0 * row, 0.1 * column**2 - 0.3 * row**2 + row * column):
-        resample(grey, x, y, np.ones((30, 30), np.bool_), out)
+        window = spline.of_surface(grey[1:, 2:].astype(np.float32))  # of a photograph, from its column 2 and row 1 on
+        resample(window, np.array([2, 1]), x, y, np.ones((30, 30), np.bool_), out)
         true = 3.0 * x - 2.0 * y if grey[0, 1] == 3.0 else 0.1 * x**2 - 0.3 * y**2 + x * y
         np.testing.assert_allclose(out, true, rtol=1e-6, atol=1e-4)
+
+
+@pytest.mark.parametrize("wave", [0.5, 0.9, 1.3])
+def test_splines_leave_waves_where_they_are_and_keys_kernel_moves_them(wave):
+    column, between = np.arange(400.0), np.full((1, 400), 0.8, np.float32)
+    image = np.sin(wave * column)[None].astype(np.float32)
+
+    def moved(right):
+        """px, by which the wave lies off its place when the image is taken between its pixels."""
+        out = np.empty((1, 400), np.float32)
+        align(right, between, np.ones((1, 400), np.bool_), np.zeros((1, 400), np.float32), out)
+        inside, at = out[0, 20:380], wave * (column - 0.8)[20:380]
+        basis = np.column_stack([np.sin(at), np.cos(at)])
+        sine, cosine = np.linalg.lstsq(basis, inside, rcond=None)[0]
+        return np.arctan2(cosine, sine) / wave
+
+    # the place is a fifth of a pixel beyond the pixel before it
+    of_keys = wave**2 * 0.2 * 0.8 * 0.6 / 6.0
+    assert abs(moved(spline.along_rows(image))) < 0.25 * of_keys
+
+
+def test_a_spline_goes_through_the_pixels():
+    image = np.random.default_rng(8).normal(size=(60, 70)).astype(np.float32)
+    row, column = (np.ascontiguousarray(a, np.float32) for a in np.mgrid[10:50, 10:60])
+    out = np.empty((40, 50), np.float32)
+    resample(spline.of_surface(image), column, row, np.ones((40, 50), np.bool_), out)
+    np.testing.assert_allclose(out, image[10:50, 10:60], atol=0.01)
+
+
+def test_places_between_nodes_are_right_on_average():
+    shape = 64, 96
+    column, row = np.meshgrid(*epipolar._lattice((-50, 30), shape))
+    x, y = np.meshgrid(-50.0 + np.arange(shape[1]), 30.0 + np.arange(shape[0]))
+
+    def curved(x, y):
+        return 0.001 * x * x - 0.0005 * y * y + 0.0008 * x * y + 2.0 * x - y
+
+    found = epipolar._between_nodes(curved(column, row), shape)
+    error = (found - curved(x, y))[16:-16, 16:-16]
+    assert abs(error.mean()) < 1e-6
+    # straight lines are off a parabola by an eighth of what it bends over a node at most, here half above, half below
+    assert 0.003 < np.abs(error).max() < 0.01
+
+
+@pytest.mark.parametrize("shift", [0.1, 0.2, 0.35, 0.65, 0.8, 0.9])
+def test_parallaxes_do_not_lean_towards_pixels_nor_away(shift):
+    found = parallaxes_of(textured_pair(shift, 0.0, 1.0, 4))
+    assert abs(np.nanmean(found.value) - shift) < 0.004
 
 
 def test_rows_are_moved_by_what_changes_over_the_image():
@@ -337,7 +386,9 @@ def test_rows_are_moved_by_what_changes_over_the_image():
 
 def test_pixels_are_aligned_by_their_parallaxes():
     column = np.arange(60.0)
-    right = np.tile(0.1 * column**2 - column, (4, 1)).astype(np.float32)
+    # as long as the image goes on beyond its edge, splines know parabolas there as well
+    beyond = np.arange(-9.0, 69.0)
+    right = spline.along_rows(np.tile(0.1 * beyond**2 - beyond, (4, 1)).astype(np.float32))[:, 9:-9]
     value = np.random.default_rng(2).uniform(-9.0, 9.0, (4, 60)).astype(np.float32)
     value[:, 20], value[:, 21] = 5.0, -10_000.0
     known = value > -1000.0

@@ -37,18 +37,37 @@ def place_of_pixels(rays, value, out, per_pixel):
 
     value : (rows, columns) px beyond P, NaN unknown.
     """
+    bend, whole = np.empty(value.shape[1], np.float32), np.empty(value.shape[1])
     for i in range(value.shape[0]):
-        _place_of_row(rays, i, value[i], rays.known[i], out[0, i], out[1, i], out[2, i], per_pixel[i])
+        _whole_parallaxes(value[i], rays.known[i], bend, whole)
+        _place_of_row(rays, i, bend, whole, out[0, i], out[1, i], out[2, i], per_pixel[i])
 
 
 @leaf_kernel
-def _place_of_row(rays, i, value, known, x, y, z, per_pixel):
+def _whole_parallaxes(value, known, bend, whole):
+    """Parallaxes of a row with those taken out, and by how much these change there from a column to the next.
+
+    In two loops: the first one works several pixels at once, the second reads here and there.
+    """
+    last = len(value) - 1.001
+    for j in range(len(value)):
+        found = value[j]
+        whole[j] = min(max(j - (found if found == found else 0.0), 0.0), last)
+    for j in range(len(value)):
+        at = whole[j]
+        left = int(at)
+        bend[j] = known[left + 1] - known[left]
+        whole[j] = value[j] + known[left] + (at - left) * bend[j]
+
+
+@leaf_kernel
+def _place_of_row(rays, i, bend, whole, x, y, z, per_pixel):
     """Of the pixels of row i, without a branch: so several are computed at once.
 
     A ray is linear in the column p, so what it reaches at a depth t is t·(e + p·g) beyond the centre, and a coordinate
     is a polynomial in t and p.
     """
-    r, columns, share = rays.rotation, value.shape[0], 1.0 / rays.reach
+    r, share = rays.rotation, 1.0 / rays.reach
     up = -(rays.first[1] + i) / rays.f
     e = share * (r[0, 1] * up - r[0, 2]), share * (r[1, 1] * up - r[1, 2]), share * (r[2, 1] * up - r[2, 2])
     g = share * r[0, 0], share * r[1, 0], share * r[2, 0]
@@ -58,19 +77,15 @@ def _place_of_row(rays, i, value, known, x, y, z, per_pixel):
     z0, z1, z2, z3, z4, z5 = _along_row(rays.to_grid[2], start, e, g)
     down, aside = e[2] * rays.reach, g[2] * rays.reach
     scale, per = rays.f * rays.base, 1.0 / rays.f
-    for j in range(columns):
-        found = value[j]
-        at = min(max(j - (found if found == found else 0.0), 0.0), columns - 1.001)
-        left = int(at)
-        by_column = known[left + 1] - known[left]
-        inverse = 1.0 / (found + known[left] + (at - left) * by_column)
+    for j in range(len(whole)):
+        inverse = 1.0 / whole[j]
         t = scale * inverse
         t = t if t > 0.0 else np.nan
         p = (rays.first[0] + j) * per
         x[j] = x0 + t * (x1 + x2 * p + t * (x3 + p * (x4 + p * x5)))
         y[j] = y0 + t * (y1 + y2 * p + t * (y3 + p * (y4 + p * y5)))
         z[j] = z0 + t * (z1 + z2 * p + t * (z3 + p * (z4 + p * z5)))
-        per_pixel[j] = abs(t * (down + aside * p)) * (1.0 - by_column) * inverse
+        per_pixel[j] = abs(t * (down + aside * p)) * (1.0 - bend[j]) * inverse
 
 
 @leaf_kernel

@@ -12,8 +12,10 @@ from aerotri.compiled import kernel, leaf_kernel
 
 HALF = 3
 """Pixels of a window on either side of its middle."""
-PART = 256
-"""Columns that are worked together."""
+PART = 512
+"""Columns that are worked together; what is kept of them is 180 kB, and fewer columns are more ends of loops."""
+SPARE = 8
+"""Columns more that are kept, of windows that reach beyond the part; 64 bytes, so that rows begin alike in memory."""
 KEPT_ROWS = 8
 """Rows kept, one more than a window has."""
 SIGNALS, SUMS = 4, 14
@@ -31,9 +33,8 @@ def shift_windows(left, right, level, known, shift, across, variance, variance_a
     """
     rows, columns = left.shape
     side = 2 * HALF + 1
-    kept = np.zeros((KEPT_ROWS, SIGNALS, PART + 2 * HALF), np.float32)
-    sums = np.zeros((SUMS, PART + 2 * HALF))
-    means = np.zeros((SUMS, PART))
+    kept = np.zeros((KEPT_ROWS, SIGNALS, PART + SPARE), np.float32)
+    sums, means = np.zeros((SUMS, PART + SPARE)), np.zeros((SUMS, PART + SPARE))
     for out in (shift, across, variance, variance_across, correlation):
         out[:] = np.nan
     above, below, start, end = _known_part(known)
@@ -79,18 +80,22 @@ def _known_part(known):
 
 @leaf_kernel
 def _signals(left, right, level, i, first, n, out):
-    """Of n pixels of row i; gradients by Scharr's weights."""
+    """Of n pixels of row i; gradients by Scharr's weights.
+
+    Rows are cut out first: a column that may be negative, as far as the compiler knows, keeps it from working several
+    pixels at once.
+    """
     near, middle = np.float32(3.0 / 64.0), np.float32(10.0 / 64.0)
+    part = slice(first - 1, first + n + 1)
+    l0, l1, l2 = left[i - 1, part], left[i, part], left[i + 1, part]
+    r0, r1, r2 = right[i - 1, part], right[i, part], right[i + 1, part]
     for j in range(n):
-        c = first + j
-        out[0, j] = left[i, c] - right[i, c]
-        out[3, j] = right[i, c] - level
+        out[0, j] = l1[j + 1] - r1[j + 1]
+        out[3, j] = r1[j + 1] - level
     for j in range(n):
-        c = first + j
-        a, b = left[i - 1, c - 1] + right[i - 1, c - 1], left[i - 1, c + 1] + right[i - 1, c + 1]
-        d, e = left[i + 1, c - 1] + right[i + 1, c - 1], left[i + 1, c + 1] + right[i + 1, c + 1]
-        x = (left[i, c + 1] + right[i, c + 1]) - (left[i, c - 1] + right[i, c - 1])
-        y = (left[i + 1, c] + right[i + 1, c]) - (left[i - 1, c] + right[i - 1, c])
+        a, b, d, e = l0[j] + r0[j], l0[j + 2] + r0[j + 2], l2[j] + r2[j], l2[j + 2] + r2[j + 2]
+        x = (l1[j + 2] + r1[j + 2]) - (l1[j] + r1[j])
+        y = (l2[j + 1] + r2[j + 1]) - (l0[j + 1] + r0[j + 1])
         out[1, j] = near * ((b - a) + (e - d)) + middle * x
         out[2, j] = near * ((d - a) + (e - b)) + middle * y
 
@@ -113,12 +118,14 @@ def _move_sums(new, old, n, sums):
 
 @leaf_kernel
 def _means(sums, n, out):
-    """Over whole windows."""
+    """Over whole windows: sums of two columns first, which windows share."""
     share = 1.0 / (2 * HALF + 1) ** 2
     for k in range(SUMS):
         s, to = sums[k], out[k]
+        for j in range(n + 4):
+            to[j] = s[j] + s[j + 1]
         for j in range(n):
-            to[j] = share * (((s[j] + s[j + 1]) + (s[j + 2] + s[j + 3])) + ((s[j + 4] + s[j + 5]) + s[j + 6]))
+            to[j] = share * ((to[j] + to[j + 2]) + (to[j + 4] + s[j + 6]))
 
 
 @leaf_kernel

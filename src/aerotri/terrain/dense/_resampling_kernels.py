@@ -1,7 +1,8 @@
-"""Cubic convolution that keeps straight lines where they are.
+"""Images between their pixels: cubic B-splines, and cubic convolution across the base.
 
 OpenCV's cubic (a = −0.75) moves a ramp by up to 0.047 px and knows 32 places between two pixels only, which is more
-than matching may lose. Keys' (1981) a = −0.5 is exact for polynomials of second order.
+than matching may lose. Keys' (1981) a = −0.5 is exact for polynomials of second order, cubic splines for those of third
+order (see `spline`).
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import numpy as np
 
 from aerotri.compiled import kernel, leaf_kernel
 
-ONE, HALF, SQUARE, CUBE = (np.float32(number) for number in (1.0, 0.5, 2.5, 1.5))
+ONE, HALF, SQUARE, CUBE, SIXTH, MOST = (np.float32(number) for number in (1.0, 0.5, 2.5, 1.5, 1.0 / 6.0, 2.0 / 3.0))
 """Numbers of the weights, in single precision: places of pixels are known no better."""
 
 
@@ -26,11 +27,19 @@ def _weights(t):
     )
 
 
+@leaf_kernel
+def _spline_weights(t):
+    """Of the coefficients of the four pixels around, the place being t (float32) beyond the second."""
+    s = ONE - t
+    return SIXTH * s * s * s, MOST - t * t * (ONE - HALF * t), MOST - s * s * (ONE - HALF * s), SIXTH * t * t * t
+
+
 @kernel
-def resample(pixels, x, y, known, out):
+def resample(pixels, first, x, y, known, out):
     """Grey values at places, column x and row y of pixel centres; at the edge its pixels go on. Unknown ones are 0.
 
-    pixels : (·, ·). x, y, known, out : (rows, columns); x, y and out of float32.
+    pixels : (·, ·) float32, coefficients of a spline surface from column and row `first` of a photograph on, two more
+    about all places. x, y, known, out : (rows, columns); x, y and out of float32.
     """
     last_row, last_column = pixels.shape[0] - 1, pixels.shape[1] - 1
     for i in range(out.shape[0]):
@@ -39,9 +48,9 @@ def resample(pixels, x, y, known, out):
             if not known[i, j]:
                 continue
             left, above = np.floor(x[i, j]), np.floor(y[i, j])
-            column, row = int(left), int(above)
-            a, b, c, d = _weights(x[i, j] - left)
-            across = _weights(y[i, j] - above)
+            column, row = int(left) - first[0], int(above) - first[1]
+            a, b, c, d = _spline_weights(x[i, j] - left)
+            across = _spline_weights(y[i, j] - above)
             total = np.float32(0.0)
             if 1 <= column < last_column - 1 and 1 <= row < last_row - 1:
                 for k in range(4):
@@ -112,6 +121,7 @@ def _between_rows(above, upper, lower, below, down, whole, out):
 def align(right, value, known, left, out):
     """The right epipolar image where the left one's pixels have their parallaxes; the left one's where not known.
 
+    right : (rows, columns) float32, coefficients of splines along its rows.
     value : (rows, columns) float32 px, left column − right column. out : float32.
     """
     for i in range(out.shape[0]):
@@ -126,6 +136,6 @@ def _align_row(right, value, known, left, out):
         place = j - int(whole)
         inside = known[j] and place >= 1 and place < len(out) - 2
         column = place if inside else 1
-        a, b, c, d = _weights(whole - value[j])
+        a, b, c, d = _spline_weights(whole - value[j])
         found = (a * right[column - 1] + b * right[column]) + (c * right[column + 1] + d * right[column + 2])
         out[j] = found if inside else left[j]

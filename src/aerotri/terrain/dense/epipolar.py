@@ -15,13 +15,17 @@ import numpy as np
 from scipy.interpolate import NearestNDInterpolator
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from aerotri.terrain.dense import spline
 from aerotri.terrain.dense._resampling_kernels import resample, within
 from aerotri.terrain.dense.grey_store import GreyStore
 from aerotri.terrain.dense.place import Place
+from aerotri.terrain.dense.scratch import scratch
 
 LATTICE_PX = 8
 """Pixels between places that are projected, the others lying linearly between them; chosen [C]: the curvature of
-tilts and lenses over 8 pixels is far below a hundredth of a pixel."""
+tilts and lenses over 8 pixels is up to a hundredth of a pixel, half of which its mean has."""
+MEAN_CURVATURE = 1.0 / 12.0 + 1.0 / (24.0 * LATTICE_PX**2)
+"""Of the second difference of three nodes in a row, by which straight lines lie above a parabola on average [D]."""
 MARGIN_PX = 24
 """By which epipolar images reach beyond the ground wanted; chosen [C]: more than windows and paths of the matching
 need."""
@@ -140,10 +144,17 @@ def _lattice(first: tuple[int, int], shape: tuple[int, int]) -> tuple[np.ndarray
     return columns, rows
 
 
-def _between_nodes(nodes: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """(rows, columns, …) bilinear between the nodes of the lattice."""
+def _between_nodes(nodes: np.ndarray, shape: tuple[int, int], room: np.ndarray | None = None) -> np.ndarray:
+    """(rows, columns, …) bilinear between the nodes of the lattice, right on average where they are curved.
+
+    room : where it is written, if given.
+    """
     s = LATTICE_PX
-    whole = cv2.resize(nodes, (s * nodes.shape[1], s * nodes.shape[0]), interpolation=cv2.INTER_LINEAR)
+    flat = nodes.copy()
+    flat[1:-1] -= MEAN_CURVATURE * (nodes[:-2] - 2.0 * nodes[1:-1] + nodes[2:])
+    flat[:, 1:-1] -= MEAN_CURVATURE * (nodes[:, :-2] - 2.0 * nodes[:, 1:-1] + nodes[:, 2:])
+    size = s * nodes.shape[1], s * nodes.shape[0]
+    whole = cv2.resize(flat, size, dst=room, interpolation=cv2.INTER_LINEAR)
     return whole[s : s + shape[0], s : s + shape[1]]
 
 
@@ -219,15 +230,28 @@ def _resampled(
     u = np.column_stack([column, -row, np.full(len(row), -g.f)]) * (depth / g.f)
     pixel = place.project(k, centre + u @ g.rotation.T) * 0.5**g.level - 0.5
     pixels = store.level(k, g.level)
-    place_of = _between_nodes(np.nan_to_num(pixel, nan=-1e6).astype(np.float32).reshape(*size, 2), g.shape)
+    nodes = np.nan_to_num(pixel, nan=-1e6).astype(np.float32)
+    on_lattice = LATTICE_PX * size[0], LATTICE_PX * size[1], 2
+    room = scratch.take(1, (int(np.prod(on_lattice)),))[0].reshape(on_lattice)
+    place_of = _between_nodes(nodes.reshape(*size, 2), g.shape, room)
     edge = place.view.edge * np.array([pixels.shape[1], pixels.shape[0]])
     x, y = place_of[:, :, 0], place_of[:, :, 1]
     known = np.empty((rows, columns), np.bool_)
     last = pixels.shape[1] - 2.0 - edge[0], pixels.shape[0] - 2.0 - edge[1]
     within(x, y, (edge[0] + 1.0, edge[1] + 1.0), last, known)
+    if not known.any():
+        return np.zeros((rows, columns), np.float32), known
+    left, right = _reached(x, known, pixels.shape[1])
+    above, below = _reached(y, known, pixels.shape[0])
     out = np.empty((rows, columns), np.float32)
-    resample(pixels, x, y, known, out)
+    resample(spline.of_surface(pixels[above:below, left:right]), np.array([left, above]), x, y, known, out)
     return out, known
+
+
+def _reached(at: np.ndarray, known: np.ndarray, count: int) -> tuple[int, int]:
+    """First row or column of pixels, and the one after the last, that splines at the known places are made of."""
+    low, high, *_ = cv2.minMaxLoc(at, known.view(np.uint8))
+    return max(int(low) - spline.REACH - 1, 0), min(int(high) + spline.REACH + 3, count)
 
 
 def _mean_depth(g: EpipolarGeometry) -> float:

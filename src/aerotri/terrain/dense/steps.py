@@ -13,7 +13,7 @@ import numpy as np
 
 from aerotri.terrain.dense.cell_scale import CellScale, middle_height, square, sum_about
 
-STEP_SHARE, STRAIGHT_SHARE, ALONE_SHARE = 0.49, 0.17, 0.36
+STEP_SHARE, STRAIGHT_SHARE, ALONE_SHARE = 0.54, 0.16, 0.36
 """Of a step that is σ of the cells next to it, where steps about them run in all directions, as crowns of trees have
 them, where they run straight, as at houses and walls, and where one pair alone saw the cell, either way; chosen [C]
 with the rest of this module on rendered houses, walls, trees and few photographs (tools/prove/dense_surface.py)."""
@@ -26,7 +26,7 @@ FLATTEST_PX, STEEPEST_PX = 0.01, 2.0
 """Of parallax from cell to cell: less is rounding; a higher step tells its direction no better."""
 LEAST_STEP_PX, LEAST_HIDDEN_PX = 0.9, 0.5
 """Of parallax, from which on heights differ by a step, and where a hole may hide the rest of it; chosen [C]."""
-SEVERAL, BLURRED_STEP_PX = 3, 1.1
+SEVERAL, BLURRED_STEP_PX = 3, 1.35
 """Pairs that agree on a height, and the largest step, of parallax, that counts where so many do; chosen [C]: what they
 see alike is seldom the height of the other side, but a window across a step blurs it for all of them."""
 STEP_SIGMAS = 6.0

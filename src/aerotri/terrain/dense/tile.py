@@ -18,6 +18,7 @@ from aerotri.terrain.dense.height_range import HeightRange
 from aerotri.terrain.dense.pairs import Candidate, Pair, chosen_pairs, noise_correlation, pair_for_holes, possible_pairs
 from aerotri.terrain.dense.parallaxes import Parallaxes, parallaxes_of
 from aerotri.terrain.dense.place import Place, place_at
+from aerotri.terrain.dense.scratch import scratch
 from aerotri.terrain.dense.tile_surface import TileSurface, empty_tile
 from aerotri.terrain.photographs import Photographs
 
@@ -191,8 +192,8 @@ def _heights(place: Place, g: EpipolarGeometry, found: Parallaxes, grid: Grid) -
         g.f, g.base, g.first, g.known, np.ascontiguousarray(g.centre), np.ascontiguousarray(g.rotation), to_grid,
         place.reach,
     )  # fmt: skip
-    place_of = np.empty((3, *found.value.shape), np.float32)
-    per_pixel = np.empty(found.value.shape, np.float32)
+    place_of, per_pixel = np.split(scratch.take(4, found.value.shape), [3])
+    per_pixel = per_pixel[0]
     kernels.place_of_pixels(rays, found.value, place_of, per_pixel)
     z, sigma = (np.full((grid.rows, grid.columns), np.nan) for _ in range(2))
     kernels.lay_mesh(place_of, found.sigma, per_pixel, found.value, LARGEST_JUMP_PX, z, sigma)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.compiled import kernel
+from aerotri.compiled import kernel, leaf_kernel
 
 
 @kernel
@@ -29,7 +29,7 @@ def differences(found, value, most, out):
                     out[i, j, a, b] = out[i, j, b, a] = min(total / bands, most)
 
 
-@kernel
+@leaf_kernel
 def _seams(here, there, at_here, at_there, most, least, out):
     """V of all candidates of two neighbours, (q, q) out.
 

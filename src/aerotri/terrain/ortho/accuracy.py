@@ -16,6 +16,7 @@ alike, and an error of the height that comes from the ray of the photograph itse
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -93,7 +94,7 @@ class ShownCells:
     slope: np.ndarray
     seen_by: np.ndarray
 
-    @property
+    @cached_property
     def spread(self) -> np.ndarray:
         """(n, 2, 2) K."""
         flat = np.maximum(1.0 - np.sum(self.along * self.slope, axis=1), FLATTEST)
