@@ -55,8 +55,8 @@ def volume(
     boundary: Annotated[
         str | None,
         typer.Option(
-            help="GeoPackage, GeoJSON, WKT file or WKT text; several polygons are piles, each with its own volume. "
-            "Default: the whole surface.",
+            help="GeoPackage, GeoJSON, WKT file or WKT text; several polygons, and the parts of one feature, are "
+            "piles, each with its own base and volume. Default: the whole surface.",
             rich_help_panel=SURFACE,
         ),
     ] = None,
@@ -145,7 +145,7 @@ def volume(
 
     given = VolumeInput(
         surface, base, boundary, cast(Any, method), adjustment, pickets, base_adjustment, base_pickets,
-        cast(Any, layer), density, density_sigma, project,
+        cast(Any, layer), density, density_sigma, project, cast(Any, boundary_from),
     )  # fmt: skip
     options = SigmaOptions(
         matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma,

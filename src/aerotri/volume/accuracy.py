@@ -254,9 +254,11 @@ def _model_in_words(part: Part, parts: dict[str, float]) -> str:
         f"the errors of the photographs change {change}, more than noise explains" if change
         else "the residuals show image errors that the additional parameters leave"
     )  # fmt: skip
+    if in_digits(total, 2) == in_digits(noise, 2):
+        return f"{why}: with this model part the adjustment's share of σ stays {in_digits(total, 2)} m³"
     return (
-        f"{why}: with this model part the adjustment's share of σ is {in_digits(total, 4)} m³ instead of "
-        f"{in_digits(noise, 4)} m³"
+        f"{why}: with this model part the adjustment's share of σ is {in_digits(total, 2)} m³ instead of "
+        f"{in_digits(noise, 2)} m³"
     )
 
 
