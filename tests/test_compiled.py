@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import pytest
 
 from aerotri import compiled
@@ -12,8 +10,7 @@ from aerotri import compiled
 @pytest.fixture
 def new_process(monkeypatch, tmp_path):
     """The state of a process that begins with an empty cache."""
-    example = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path)))
-    state = {"cached": True, "example": example, "said": False, "ahead": False}
+    state = {"cached": True, "folders": {tmp_path / "first", tmp_path / "last"}, "said": False, "ahead": False}
     monkeypatch.setattr(compiled, "_state", state)
     return state
 
@@ -24,8 +21,11 @@ def test_the_notice_is_given_once(new_process):
     assert compiled.compilation_notice() == ""
 
 
-def test_no_notice_with_kernels_in_the_cache(new_process, tmp_path):
-    (tmp_path / "kernel.nbi").touch()
+@pytest.mark.parametrize("folder", ["first", "last"])
+def test_no_notice_with_kernels_in_the_cache(new_process, tmp_path, folder):
+    """Whichever kernels a command uses: those of the module that is imported last may be others."""
+    (tmp_path / folder).mkdir()
+    (tmp_path / folder / "kernel.nbi").touch()
     assert compiled.compilation_notice() == ""
 
 
@@ -36,6 +36,7 @@ def test_without_a_place_for_the_cache_it_is_said_once(new_process):
 
 
 def test_kernels_that_others_have_just_kept_are_of_this_run(new_process, tmp_path):
-    (tmp_path / "kernel.nbi").touch()
+    (tmp_path / "first").mkdir()
+    (tmp_path / "first" / "kernel.nbi").touch()
     compiled.compiled_ahead()
     assert "first run only" in compiled.compilation_notice()

@@ -7,10 +7,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+import rasterio
 from rasterio.errors import NotGeoreferencedWarning
 
+from aerotri import cli
 from aerotri.rasters.images import create_image, open_photograph
-from aerotri.rasters.quiet import quietly
+from aerotri.rasters.quiet import MESSAGE, quietly
 
 
 def test_threads_that_overlap_leave_the_filters_as_they_were():
@@ -51,3 +53,25 @@ def test_photographs_read_by_many_threads_warn_of_nothing(tmp_path):
         with ThreadPoolExecutor(8) as threads:
             assert set(threads.map(read, range(200))) == {40}
         assert said == []
+
+
+def test_filters_that_another_library_brings_back_do_not_make_the_program_warn(monkeypatch):
+    """One thread compiles with numba, which leaves its own `catch_warnings` while another one opens a photograph."""
+    monkeypatch.setattr(warnings, "formatwarning", warnings.formatwarning)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        cli._warn_in_lines()
+        other = warnings.catch_warnings()
+        other.__enter__()
+        with quietly():
+            other.__exit__(None, None, None)
+            warnings.warn(f"{MESSAGE}, gcps, or rpcs.", NotGeoreferencedWarning, stacklevel=1)
+        assert said == []
+
+
+def test_the_message_is_that_of_rasterio(tmp_path):
+    path = tmp_path / "photograph.tif"
+    with create_image(path, 40, 30, 1, "uint8") as writer:
+        writer.write(0, np.zeros((1, 30, 40), np.uint8))
+    with pytest.warns(NotGeoreferencedWarning, match=f"^{MESSAGE}"), rasterio.open(path):
+        pass

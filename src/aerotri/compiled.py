@@ -21,7 +21,7 @@ OPTIONS: dict[str, Any] = {
     "no_cfunc_wrapper": True,
 }  # fmt: skip
 
-_state: dict[str, Any] = {"cached": True, "example": None, "said": False, "ahead": False}
+_state: dict[str, Any] = {"cached": True, "folders": set(), "said": False, "ahead": False}
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -50,7 +50,7 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     except RuntimeError:  # numba found no writable place
         _state["cached"] = False
         return compiled
-    _state["example"] = compiled
+    _state["folders"].add(Path(compiled.stats.cache_path))
     return compiled
 
 
@@ -76,12 +76,13 @@ def compilation_notice() -> str:
         notice = (
             "compiling kernels; there is no writable place to keep them (set NUMBA_CACHE_DIR), so every run does this"
         )
-    elif _state["ahead"] or _keeps_nothing(_state["example"]):
+    elif _state["ahead"] or _keep_nothing(_state["folders"]):
         notice = "compiling kernels, in this first run only (10 to 30 s)"
     _state["said"] = bool(notice)
     return notice
 
 
-def _keeps_nothing(kernel: Any) -> bool:
-    """Whether the folder for a kernel and its neighbours is still empty."""
-    return kernel is not None and not any(Path(kernel.stats.cache_path).glob("*.nbi"))
+def _keep_nothing(folders: set[Path]) -> bool:
+    """Whether nothing is kept of any kernel: many folders stay empty, as their kernels are part of others or not called
+    by every command."""
+    return bool(folders) and not any(any(folder.glob("*.nbi")) for folder in folders)

@@ -206,7 +206,7 @@ def test_wrong_settings_and_places_are_refused(made, tmp_path):
     for given, message in (
         ({"resolution": -1.0}, "resolution -1 is not possible"), ({"area": (1.0, 0.0, 0.0, 1.0)}, "the area is empty"),
         ({"most_pairs": 0}, "most_pairs 0 is not possible"),
-        ({"area": (1e5, 1e5, 1.001e5, 1.001e5)}, "no two photographs"),
+        ({"area": (1e5, 1e5, 1.001e5, 1.001e5)}, "the area does not meet the photographs"),
     ):  # fmt: skip
         with pytest.raises(InputError, match=message):
             aerotri.dense_surface(here / "result", photographs, **given)
@@ -216,3 +216,54 @@ def test_wrong_settings_and_places_are_refused(made, tmp_path):
     with pytest.raises(InputError, match="holds other files than tiles"):
         aerotri.dense_surface(here / "result", photographs, tiles=tmp_path)
     assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
+
+
+def test_photographs_of_the_block_that_were_not_given_are_named(made, tmp_path):
+    here, _ = made
+    names = sorted(path.name for path in (here / "block" / "photographs").iterdir())
+    (tmp_path / "some").mkdir()
+    for name in names[:2]:
+        (tmp_path / "some" / name).symlink_to(here / "block" / "photographs" / name)
+    said = f"1 photograph of the block is not in {tmp_path / 'some'}"
+    area = ("--area", *map(str, _middle(here)))
+    printed = run("dsm", here / "result", tmp_path / "some", "--out", tmp_path / "dsm", "--no-plots", *area)
+    assert f"note: {said}" in printed
+    content = json.loads((tmp_path / "dsm" / "dsm.json").read_text(encoding="utf-8"))
+    missing = content["photographs_missing"]
+    assert len(missing) == 1
+    assert missing[0] in names[2]
+    assert missing[0] in printed
+    assert content["notes"][0].startswith(said)
+    whole = json.loads((here / "dsm" / "dsm.json").read_text(encoding="utf-8"))
+    assert (whole["photographs_missing"], whole["notes"]) == ([], [])
+    printed = run("dtm", here / "result", tmp_path / "some", "--out", tmp_path / "dtm", "--no-plots",
+                  "--interval", 20)  # fmt: skip
+    assert f"note: {said}" in printed
+    assert json.loads((tmp_path / "dtm" / "dtm.json").read_text(encoding="utf-8"))["photographs_missing"] == missing
+    printed = run("ortho", here / "result", tmp_path / "some", here / "dsm", "--out", tmp_path / "ortho", "--no-plots",
+                  "--cell", 4)  # fmt: skip
+    assert f"note: {said}" in printed
+    assert json.loads((tmp_path / "ortho" / "ortho.json").read_text(encoding="utf-8"))["photographs_missing"] == missing
+
+
+def _middle(here):
+    with RasterReader(here / "dsm" / "dsm.tif") as reader:
+        left, bottom, right, top = reader.grid.bounds
+    x, y = (left + right) / 2.0, (bottom + top) / 2.0
+    return x - 40.0, y - 40.0, x + 40.0, y + 40.0
+
+
+def test_an_area_beside_the_photographs_and_cells_larger_than_the_ground_are_refused(made, tmp_path):
+    here, _ = made
+    photographs = here / "block" / "photographs"
+    with pytest.raises(InputError, match=r"the area does not meet the photographs: they show X -?[0-9]+ to") as refused:
+        aerotri.dense_surface(here / "result", photographs, area=(9e5, 9e5, 9.1e5, 9.1e5))
+    assert "coordinates of the block" in refused.value.remedy
+    with pytest.raises(InputError, match="a cell of 9000 m is larger than the ground") as refused:
+        aerotri.dense_surface(here / "result", photographs, resolution=9000.0)
+    assert "--resolution" in refused.value.remedy
+    (tmp_path / "one").mkdir()
+    first = sorted(photographs.iterdir())[0]
+    (tmp_path / "one" / first.name).symlink_to(first)
+    with pytest.raises(InputError, match="1 photograph of the block is in"):
+        aerotri.dense_surface(here / "result", tmp_path / "one")

@@ -78,6 +78,14 @@ def test_the_number_its_parts_and_the_page(place, tmp_path):
     assert len(lines) == 1 + content["sections"]["count"]
 
 
+def test_a_stated_sigma_of_the_base_takes_the_place_of_what_the_ground_tells(place, tmp_path):
+    judged = run(place, tmp_path / "judged", given(place, "boundary"))
+    stated = run(place, tmp_path / "stated", given(place, "boundary"), SigmaOptions(base_sigma=0.02))
+    assert stated["sigma"]["parts_m3"]["base"] == pytest.approx(0.02 * stated["boundary"]["area_m2"])
+    assert any("how well the ground outside" in text for text in judged["warnings"])
+    assert not any("how well the ground outside" in text for text in stated["warnings"])
+
+
 def test_two_surfaces_of_one_adjustment_cancel_what_they_share(place, tmp_path):
     """The hill over the ground: what tilts and lifts both is gone, what is left is the height of the hill."""
     one = run(place, tmp_path / "one", given(place))

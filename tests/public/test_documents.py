@@ -280,3 +280,30 @@ def test_logo_travels_with_the_block(result, tmp_path):
 def _exported(result, out):
     aerotri.export(result, out, "pdf")
     return out / "adjustment.pdf"
+
+
+def _changed(folder, rise):
+    flat = np.full((30, 30), 100.0)
+    first, second = (
+        aerotri.Surface.of_array(z, left=500.0, top=530.0, cell=1.0, sigma=np.full(flat.shape, 0.02))
+        for z in (flat, flat + rise)
+    )
+    aerotri.change(first, second).save(folder, plots=False)
+    return folder
+
+
+def test_a_document_of_another_result_is_not_replaced(tmp_path):
+    first, second = _changed(tmp_path / "first", 1.0), _changed(tmp_path / "second", 2.0)
+    out = tmp_path / "documents"
+    aerotri.export(first, out, to="pdf")
+    kept = (out / "change.pdf").read_bytes()
+    with pytest.raises(InputError, match=r"is the document of another result, .*first") as refused:
+        aerotri.export(second, out, to="pdf")
+    assert "another folder" in refused.value.remedy
+    assert (out / "change.pdf").read_bytes() == kept
+    aerotri.export(_changed(first, 3.0), out, to="pdf", language="de")
+    assert (out / "change.pdf").read_bytes() != kept
+    (out / "change.pdf").unlink()
+    aerotri.export(second, out, to="pdf")
+    with pytest.raises(InputError, match=r"another result, .*second"):
+        aerotri.export(first, out, to="pdf")

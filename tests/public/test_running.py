@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import html
 import json
+import shlex
 
 import pytest
 
 import aerotri
 from aerotri import InputError
 from aerotri.execution.work import TasksFailedError
-from aerotri.public.run_steps import command_line
+from aerotri.public.run_steps import Step, command_line
+from aerotri.report.pages.run import _figures
 from chain_of_fakes import Fakes, ends_of
 
 
@@ -204,3 +207,30 @@ def test_a_step_whose_tasks_failed_is_named_and_others_go_on(fakes, photographs,
     assert ends["volume"] == ("left out", "dtm is missing")
     assert ends["ortho"][0] == "done"
     assert not project.complete
+
+
+def test_command_lines_can_be_copied_with_spaces_in_names(fakes, photographs, tmp_path):
+    """As a shell takes them apart again, on screen and on the page."""
+    out = tmp_path / "my drone project"
+    aerotri.run(photographs, out, dense=False)
+    steps = json.loads((out / "run.json").read_text())["steps"]
+    page = html.unescape((out / "report.html").read_text(encoding="utf-8"))
+    for step in steps:
+        told = Step(step["name"], step["folder"], step["what"], tuple(step["arguments"])).command
+        assert shlex.split(told) == ["aerotri", *step["arguments"]]
+        if step["status"] == "done":
+            assert told in page
+    assert f"'{out / 'result'}'" in page
+
+
+def test_figures_of_steps_are_in_words(tmp_path):
+    """No keys for programs, no True, no more digits than say something."""
+    content = {
+        "adjustment": "5640662b60", "tiles_resumed": 0, "of_one_adjustment": True, "gsd_m": 0.058634,
+        "sigma_m": {"image": {"q90": 0.0007833}}, "area_m2": 2516.4, "notes": ["4 photographs are not there"],
+    }  # fmt: skip
+    (tmp_path / "ortho.json").write_text(json.dumps(content), encoding="utf-8")
+    assert _figures(tmp_path) == [
+        ("surface of the same adjustment", "yes"), ("GSD [m]", "0.0586"), ("area [m²]", "2516"),
+        ("σ of positions [m]: image: 90 % below", "0.000783"), ("", "4 photographs are not there"),
+    ]  # fmt: skip

@@ -12,6 +12,8 @@ from scipy.ndimage import uniform_filter
 
 import aerotri
 from aerotri import InputError
+from aerotri.commands.change import _summary
+from aerotri.formats.results.change import at_most
 
 SIDE, SIGMA, WINDOW = 120, 0.03, 4
 STABLE = shapely.difference(shapely.box(0, 0, SIDE, SIDE), shapely.box(30, 30, 90, 90))
@@ -291,3 +293,48 @@ def test_no_sigma_is_refused(wrong, stable):
     second = aerotri.Surface.of_array(second.z, left=0.0, top=SIDE, cell=1.0, sigma=sigma, name="june")
     with pytest.raises(InputError, match=r"june.*2 cells with a height have a σ of zero or less"):
         aerotri.change(first, second, stable=stable, align="none", area=AREA)
+
+
+def test_a_surface_and_a_cloud_are_refused_as_that(tmp_path):
+    from aerotri.cli.app import invoke
+
+    for first, second in (("a.tif", "b.laz"), ("b.laz", "a.tif")):
+        with pytest.raises(aerotri.InputError, match=r"a.tif is a surface and b.laz a point cloud"):
+            invoke(["change", first, second])
+
+
+def test_surfaces_and_stable_ground_apart_are_told_by_place():
+    flat = np.full((30, 30), 100.0)
+    first, second, far = (
+        aerotri.Surface.of_array(flat, left=left, top=530.0, cell=1.0, sigma=np.full(flat.shape, 0.02))
+        for left in (500.0, 505.0, 900.0)
+    )
+    with pytest.raises(aerotri.InputError, match=r"X 500 to 530, Y 500 to 530.* lies at X 900 to 930"):
+        aerotri.change(first, far)
+    beside = "POLYGON ((700 700, 720 700, 720 720, 700 720, 700 700))"
+    with pytest.raises(aerotri.InputError, match="no cell that both surfaces have: it lies at X 700 to 720") as refused:
+        aerotri.change(first, second, stable=beside)
+    assert "inside both surfaces" in refused.value.remedy
+
+
+def test_what_is_nothing_beside_sigma_of_net_is_told_as_that(tmp_path):
+    """One small cell beyond the level of detection in a large area: no number with many digits."""
+    flat = np.full((60, 60), 100.0)
+    changed = flat.copy()
+    changed[5, 5] += 0.08
+    first, second = (
+        aerotri.Surface.of_array(z, left=500.0, top=503.0, cell=0.05, sigma=np.full(flat.shape, 0.02))
+        for z in (flat, changed)
+    )
+    found = aerotri.change(first, second, align="none", noise_length=2.0)
+    volume = found.summary["volumes"][0]
+    assert 0.0 < volume["gained_m3"] < 0.01 * volume["sigma_net_m3"]
+    least = at_most(volume, "gained")
+    assert volume["gained_m3"] < least <= 0.1 * volume["sigma_net_m3"]
+    assert at_most(volume, "net") is None
+    assert at_most(volume | {"gained_m3": volume["sigma_net_m3"]}, "gained") is None
+    page = (found.save(tmp_path / "change") / "change.html").read_text(encoding="utf-8")
+    assert f"less than {least:g} m³" in page
+    assert f"gained less than {least:g} m³" in "\n".join(_summary(found.summary))
+    assert "that of the matching" not in page
+    assert "as stated" in page

@@ -540,3 +540,46 @@ def test_a_surface_in_memory_in_a_system_in_feet_is_saved_in_metres(tmp_path):
     )
     path = surface.save(tmp_path / "surface.tif")
     np.testing.assert_allclose(aerotri.Surface(path).z, 100.0)
+
+
+def test_a_volume_without_an_adjustment_says_why_it_has_no_sigma(cone):
+    plain = aerotri.volume(cone, AROUND)
+    assert [text for text in plain.warnings if text.startswith("no σ: give --adjustment")]
+    stated = aerotri.volume(cone, AROUND, base_sigma=0.1)
+    assert not any(text.startswith("no σ:") for text in stated.warnings)
+
+
+def test_the_origin_of_a_boundary_without_an_adjustment_is_refused(cone, tmp_path):
+    with pytest.raises(InputError, match="boundary_from='product' belongs to an adjustment") as refused:
+        aerotri.volume(cone, AROUND, boundary_from="product")
+    assert "no effect" in refused.value.remedy
+    from aerotri.cli.app import invoke
+
+    path = cone.save(tmp_path / "cone.tif")
+    with pytest.raises(InputError, match="--boundary-from product belongs to --adjustment"):
+        invoke(["volume", str(path), "--boundary-from", "product", "--out", str(tmp_path / "out")])
+
+
+def test_a_folder_without_a_surface_is_told_as_that(tmp_path):
+    with pytest.raises(InputError, match=r"holds no surface: there is no dsm.tif") as refused:
+        aerotri.volume(tmp_path)
+    assert "the folder that dsm or dtm wrote" in refused.value.remedy
+
+
+def test_a_file_without_a_coordinate_system_is_told(cone, tmp_path):
+    path = aerotri.Surface.of_array(cone.z, left=LEFT, top=TOP, cell=1.0).save(tmp_path / "site.tif")
+    said = "site.tif does not say its coordinate system"
+    assert any(said in text for text in aerotri.volume(path).warnings)
+    assert not any("does not say its" in text for text in aerotri.volume(cone, AROUND).warnings)
+
+
+def test_methods_differ_in_the_digits_of_the_page(cone, tmp_path):
+    """Rounded to whole cubic metres all methods would be alike, and the table would show nothing."""
+    found = aerotri.volume(cone, AROUND, base=100.0)
+    page = (found.save(tmp_path / "volume") / "volume.html").read_text(encoding="utf-8")
+    table = page[page.index("By every method") :]
+    nets = re.findall(r"<td>[a-z, 0-9]+</td><td class=\"n\">([^<]+)</td>", table)
+    assert len(nets) == len(found.methods["net_m3"])
+    assert len(set(nets)) >= 4
+    for text, value in zip(nets, found.methods["net_m3"].tolist(), strict=True):
+        assert float(text.replace("\u2009", "").replace("−", "-")) == pytest.approx(value, abs=0.0051)

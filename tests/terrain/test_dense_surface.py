@@ -316,8 +316,8 @@ def test_resampling_keeps_straight_lines_and_parabolas():
     x, y = np.random.default_rng(6).uniform(8.0, 31.0, (2, 30, 30)).astype(np.float32)
     out = np.empty((30, 30), np.float32)
     for grey in (3.0 * column - 2.0 * row, 0.1 * column**2 - 0.3 * row**2 + row * column):
-        window = grey[1:, 2:].astype(np.float32)  # of a photograph, from its column 2 and row 1 on
-        resample(spline.of_surface(window), np.array([2, 1]), x, y, np.ones((30, 30), np.bool_), out)
+        window = spline.of_surface(grey[1:, 2:].astype(np.float32))  # of a photograph, from its column 2 and row 1 on
+        resample(window, np.array([2, 1]), x, y, np.ones((30, 30), np.bool_), out)
         true = 3.0 * x - 2.0 * y if grey[0, 1] == 3.0 else 0.1 * x**2 - 0.3 * y**2 + x * y
         np.testing.assert_allclose(out, true, rtol=1e-6, atol=1e-4)
 

@@ -36,6 +36,7 @@ from aerotri.cli import (
 from aerotri.cli.app import app
 from aerotri.conventions import InputError
 from aerotri.execution.work import NO_SPACE, TasksFailedError
+from aerotri.rasters.quiet import never_told
 
 __all__ = [
     "adjusting", "app", "blocks", "change", "converting", "explaining", "exporting", "image_errors", "main", "ortho",
@@ -59,7 +60,7 @@ def main() -> None:
     """
     interruption.while_running()
     _speak_any_encoding()
-    warnings.formatwarning = _as_line
+    _warn_in_lines()
     try:
         code = _ended()
     except KeyboardInterrupt:
@@ -77,6 +78,11 @@ def _speak_any_encoding() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
+
+
+def _warn_in_lines() -> None:
+    warnings.formatwarning = _as_line
+    never_told()
 
 
 def _as_line(

@@ -45,7 +45,8 @@ def change(
     area: Annotated[
         str | None,
         typer.Option(
-            help="Where volumes are wanted, as --stable; several polygons one by one. Default: all in common.",
+            help="Where volumes are wanted, as --stable; several polygons, and the parts of one, one by one. "
+            "Default: all in common.",
             rich_help_panel=METHOD,
         ),
     ] = None,
@@ -118,6 +119,12 @@ def change(
             first, second, sizes, stable, (first_adjustment, second_adjustment), project, out, plots, json_
         )
         return
+    if is_cloud(first) or is_cloud(second):
+        surface, cloud = (second, first) if is_cloud(first) else (first, second)
+        raise InputError(
+            f"{surface} is a surface and {cloud} a point cloud",
+            "give two of a kind: both surfaces, or both clouds (dsm writes dsm.tif and dsm.laz)",
+        )
     given = [f"--{name}" for name, value in sizes.items() if value is not None]
     if given:
         raise InputError(f"{', '.join(given)}: of point clouds, and surfaces were given", "give two LAS or LAZ files")

@@ -37,6 +37,7 @@ def ortho(
     cell: Annotated[
         float | None,
         typer.Option(
+            "--cell", "--resolution",
             min=1e-6, help="Cell, m. Default: the size of a pixel on the ground (GSD).", rich_help_panel=OUTPUT
         ),
     ] = DEFAULTS.cell,
@@ -81,7 +82,10 @@ def ortho(
         ),
     ] = DEFAULTS.fill,
     plots: Annotated[
-        bool, typer.Option(help="Draw the orthophoto and the points in it.", rich_help_panel=OUTPUT)
+        bool, typer.Option(
+            help="Draw the orthophoto with σ, and the points in it: PNG and SVG in the folder plots. A page has run "
+            "alone.", rich_help_panel=OUTPUT,
+        ),
     ] = True,
     json_: Json = False,
     executor: Workers = THREADS,

@@ -91,6 +91,16 @@ def run(
     dense: Annotated[
         bool, typer.Option(help="The dense surface and the orthophoto as well.", rich_help_panel=SURFACE)
     ] = True,
+    resolution: Annotated[
+        float | None,
+        typer.Option(
+            "--resolution",
+            "--cell",
+            min=1e-6,
+            help="Cell of the dense surface, m. Default: two pixels on the ground.",
+            rich_help_panel=SURFACE,
+        ),
+    ] = None,
     executor: Workers = THREADS,
     plots: Annotated[bool, typer.Option(help="Draw the plots of the adjustment.", rich_help_panel=OUTPUT)] = True,
     go_on: Annotated[
@@ -121,7 +131,7 @@ def run(
         "interval": metres_or_auto(interval) if interval else None,
         "boundary": boundary, "base": base, "layer": layer, "boundary_from": boundary_from,
         "boundary_sigma": boundary_sigma, "density": density, "density_sigma": density_sigma,
-        "dense": dense, "plots": plots, "go_on": go_on,
+        "dense": dense, "resolution": resolution, "plots": plots, "go_on": go_on,
         "unmarked": stop_or_continue(unmarked),
         "executor": executor, "project": project,
     }  # fmt: skip

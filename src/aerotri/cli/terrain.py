@@ -49,7 +49,13 @@ def dtm(
     ] = "auto",
     cell: Annotated[
         float | None,
-        typer.Option(min=1e-6, help="Cell of the rasters, m. Default: half of the interval.", rich_help_panel=GRID),
+        typer.Option(
+            "--cell",
+            "--resolution",
+            min=1e-6,
+            help="Cell of the rasters, m. Default: half of the interval.",
+            rich_help_panel=GRID,
+        ),
     ] = None,
     pairs: Annotated[
         bool,
@@ -165,7 +171,13 @@ def dsm(
     ] = None,
     resolution: Annotated[
         float | None,
-        typer.Option(min=1e-6, help="Cell of the surface, m. Default: two pixels.", rich_help_panel=GRID),
+        typer.Option(
+            "--resolution",
+            "--cell",
+            min=1e-6,
+            help="Cell of the surface, m. Default: two pixels on the ground.",
+            rich_help_panel=GRID,
+        ),
     ] = DENSE_DEFAULTS.resolution,
     area: Annotated[
         tuple[float, float, float, float] | None,
@@ -209,7 +221,13 @@ def dsm(
         ),
     ] = DENSE_DEFAULTS.widest_object,
     executor: Workers = THREADS,
-    plots: Annotated[bool, typer.Option(help="Draw the surface.", rich_help_panel=OUTPUT)] = True,
+    plots: Annotated[
+        bool,
+        typer.Option(
+            help="Draw heights with their σ, and colours: PNG and SVG in the folder plots. A page has run alone.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = True,
     json_: Json = False,
 ) -> None:
     """The whole surface by dense matching: a height and its standard deviation for every cell."""
@@ -242,7 +260,8 @@ def compare(
         str, typer.Option(help="Move the first onto the second: none, shift or rigid.", rich_help_panel=METHOD)
     ] = ALIGNMENT,
     cell: Annotated[
-        float | None, typer.Option(min=1e-6, help="Cell of the differences, m.", rich_help_panel=METHOD)
+        float | None,
+        typer.Option("--cell", "--resolution", min=1e-6, help="Cell of the differences, m.", rich_help_panel=METHOD),
     ] = None,
     plots: Annotated[bool, typer.Option(help="Draw map and histogram.", rich_help_panel=OUTPUT)] = True,
     project: ProjectOf = None,

@@ -55,8 +55,8 @@ def volume(
     boundary: Annotated[
         str | None,
         typer.Option(
-            help="GeoPackage, GeoJSON, WKT file or WKT text; several polygons are piles, each with its own volume. "
-            "Default: the whole surface.",
+            help="GeoPackage, GeoJSON, WKT file or WKT text; several polygons, and the parts of one feature, are "
+            "piles, each with its own base and volume. Default: the whole surface.",
             rich_help_panel=SURFACE,
         ),
     ] = None,
@@ -114,7 +114,12 @@ def volume(
     ] = SIGMA.matching_window_m,
     base_sigma: Annotated[
         float,
-        typer.Option(min=0.0, help="σ of the base's height, m, common to all of it.", rich_help_panel=SIGMAS),
+        typer.Option(
+            min=0.0,
+            help="σ of the base's height, m, common to all of it; for a spline through the boundary in place of what "
+            "the ground around tells.",
+            rich_help_panel=SIGMAS,
+        ),
     ] = SIGMA.base_sigma,
     boundary_sigma: BoundarySigma = SIGMA.boundary_sigma,
     boundary_from: BoundaryOrigin = SIGMA.boundary_from,
@@ -140,7 +145,7 @@ def volume(
 
     given = VolumeInput(
         surface, base, boundary, cast(Any, method), adjustment, pickets, base_adjustment, base_pickets,
-        cast(Any, layer), density, density_sigma, project,
+        cast(Any, layer), density, density_sigma, project, cast(Any, boundary_from),
     )  # fmt: skip
     options = SigmaOptions(
         matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma,

@@ -67,8 +67,8 @@ def _cloud_summary(c: dict[str, Any]) -> list[str]:
     lines = [
         f"{c['with_distance']} of {c['core_points']} places every {c['spacing_m']:.3g} m have a distance; cylinders of "
         f"{c['cylinder_m']:.3g} m, normals from {c['normal_m']:.3g} m, at most {c['reach_m']:.3g} m away",
-        f"σ of a distance (from {SIGMA_FROM[c['sigma_from']]}): median {c['sigma_m']:.3f} m; registration "
-        f"{c['registration_m']:.3f} m",
+        f"σ of a distance (from {SIGMA_FROM[c['sigma_from']]}): median {c['sigma_m']:.3f} m; error of the "
+        f"position of one cloud against the other {c['registration_m']:.3f} m",
         f"level of detection (95 %) {c['level_of_detection_m']:.3f} m in the median, {c['beyond_level_percent']:.1f} % "
         "of the places beyond it",
     ]
@@ -93,7 +93,12 @@ def _summary(c: dict[str, Any]) -> list[str]:
 
 def _amount(volume: dict[str, Any], of: str) -> str:
     """Without σ where no cell is beyond the level of detection: of nothing there is none."""
-    value, sigma = volume[f"{of}_m3"], volume[f"sigma_{of}_m3"]
+    from aerotri.formats.results.change import at_most
+    from aerotri.report.quality import with_sigma
+
+    value, sigma, least = volume[f"{of}_m3"], volume[f"sigma_{of}_m3"], at_most(volume, of)
+    if least is not None:
+        return f"{of} less than {least:g} m³"
     if value == 0.0 and sigma == 0.0:
         return f"nothing {of} beyond the level of detection"
-    return f"{of} {value:.6g} ± {sigma:.3g} m³"
+    return f"{of} {with_sigma(value, sigma)} m³"

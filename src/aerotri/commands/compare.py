@@ -53,6 +53,6 @@ def _summary(found: SurfaceComparison) -> list[str]:
         shared = found.matching_shared
         part = f" ({two_digits(1e3 * shared)} mm by errors that neighbouring cells share)" if shared > 0.0 else ""
         lines.append(
-            f"σ of the bias {two_digits(1e3 * found.bias_sigma)} mm{part}; noise length {found.noise_length:.3g} m"
+            f"σ of the bias {two_digits(1e3 * found.bias_sigma)} mm{part}; noise length {found.noise_length:.2g} m"
         )
     return [*lines, *([c.alignment_text] if c.alignment_text else [])]

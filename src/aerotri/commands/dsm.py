@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
+from aerotri.conventions import counted
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.files.work_place import held
 from aerotri.formats.results.json_text import json_text
@@ -52,8 +53,9 @@ def outcome_lines(found: DenseSurface, target: Path) -> list[str]:
 
 def _summary(content: dict[str, Any]) -> list[str]:
     c = content
+    pairs = counted(c["pairs"], "pair")
     lines = [
-        f"{c['photographs']} photographs in {c['pairs']} pairs, GSD {c['gsd_m']:.3f} m; cells of {c['cell_m']:.3g} m",
+        f"{c['photographs']} photographs in {pairs}, GSD {c['gsd_m']:.3f} m; cells of {c['cell_m']:.3g} m",
         f"{c['cells']['measured']} cells with a height, {c['area_m2']:.0f} m²; photographs of a cell: "
         f"{c['photographs_mean']:.1f}",
     ]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, counted
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.files.work_place import held
 from aerotri.formats.results.json_text import json_text
@@ -57,7 +57,7 @@ def outcome_lines(found: Orthophoto) -> list[str]:
     lines = [*(f"note: {note}" for note in found.notes)]
     lines.append(
         f"{s['columns']} × {s['rows']} cells of {s['cell_m']:g} m (GSD {s['gsd_m']:.3f} m) from {used} of "
-        f"{len(s['photographs'])} photographs"
+        f"{counted(len(s['photographs']), 'photograph')}"
     )
     lines.append(
         f"{area['orthophoto']:.0f} m² of {area['surface']:.0f} m² with heights; {area['without_photograph']:.0f} m² no "

@@ -72,7 +72,7 @@ class _Told:
     def __call__(self, step: Step, outcome: Any) -> None:
         """The beginning of a step, or its end with what it gave or why it failed."""
         if outcome is None:
-            self._print([f"── {step.what}: aerotri {' '.join(step.arguments)}"])
+            self._print([f"── {step.what}: {step.command}"])
             if step.name == "dtm" and self._doubt:
                 self._console.failure(self._doubt)
         elif isinstance(outcome, Exception):

@@ -11,10 +11,10 @@ from aerotri.commands.console import Console
 from aerotri.conventions import InputError, in_digits
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
-from aerotri.volume.settings import LAYER
+from aerotri.volume.settings import LAYER, SIGMA
 
 if TYPE_CHECKING:
-    from aerotri.volume.settings import Layer, Method, SectionPlan, SigmaOptions
+    from aerotri.volume.settings import BoundaryFrom, Layer, Method, SectionPlan, SigmaOptions
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,7 @@ class VolumeInput:
     density: float | None = None
     density_sigma: float = 0.0
     project: Path | None = None
+    boundary_from: BoundaryFrom = SIGMA.boundary_from
 
     def check(self) -> None:
         """Refuse what does not go together, in the words of the command line.
@@ -46,6 +47,11 @@ class VolumeInput:
         if self.adjustment is None and (self.pickets or self.base_adjustment or self.base_pickets):
             raise InputError(
                 "--pickets, --base-pickets and --base-adjustment belong to --adjustment", "give the adjustment"
+            )
+        if self.adjustment is None and self.boundary_from != SIGMA.boundary_from:
+            raise InputError(
+                f"--boundary-from {self.boundary_from} belongs to --adjustment",
+                "give the adjustment that the surface was measured with: without σ it has no effect",
             )
         if self.density is None and self.density_sigma > 0.0:
             raise InputError("--density-sigma belongs to --density", "give the density, tonnes per cubic metre")
@@ -160,10 +166,7 @@ def _beyond(content: dict[str, Any], whole: _Whole) -> list[str]:
         told.append(f"net {with_sigma(bent['value_m3'], bent['sigma_m3'], signed=True)} m³")
     if not told:
         return []
-    return [
-        f"ground that straight lines between the heights are expected to leave out: {', '.join(told)}; not in the "
-        "volume, counted in σ"
-    ]
+    return [f"terrain between the measured points (estimated, not added): {', '.join(told)}; its error is counted in σ"]
 
 
 def _pile_line(pile: dict[str, Any], whole: _Whole) -> str:

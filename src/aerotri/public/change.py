@@ -27,6 +27,7 @@ from aerotri.public.change_epochs import (
     plan_code,
 )
 from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.places import place_in_words
 from aerotri.public.projects import project_of
 from aerotri.public.table import Table
 from aerotri.public.used_arguments import used_arguments
@@ -227,6 +228,7 @@ def change(
         ground = None if stable is None else _boundary_of(stable, epsg)
         areas = _areas(area, grid, epsg)
         held = None if ground is None else ground.coverage(grid) > STABLE_PART
+        _refuse_apart(ground, held, grid)
         if ground is None:
             if not all(np.isfinite(one.noise).any() for one in (before, after)):
                 raise InputError("a surface has no σ", "give --stable, ground that did not change: it shows the noise")
@@ -256,7 +258,8 @@ def change(
     if unsure:
         notes.append(
             f"the stable ground is too level to tell a shift in plan ({', '.join(unsure)}): where both surfaces have "
-            "good positions, --align height moves the second in height alone and leaves a smaller σ"
+            "good positions, --align height moves the second in height alone, which lowers the level of detection on "
+            "slopes"
         )
     summary = change_json(found, names_of(epochs), crs, "" if ground is None else ground.name, align, tuple(notes))
     head = Head(project_of(project, second_adjustment, second, first_adjustment, first), crs)
@@ -271,12 +274,27 @@ STABLE_PART = 0.999
 """Share of a cell that must be stable."""
 
 
+def _refuse_apart(ground: Boundary | None, held: np.ndarray | None, grid: Grid) -> None:
+    """Refuse stable ground that has no cell of both surfaces.
+
+    Raises
+    ------
+    InputError
+    """
+    if ground is not None and held is not None and not held.any():
+        raise InputError(
+            f"the stable ground '{ground.name}' holds no cell that both surfaces have: it lies at "
+            f"{place_in_words(ground.polygon.bounds)}, they at {place_in_words(grid.bounds)}",
+            "draw it inside both surfaces, in their CRS",
+        )
+
+
 def _boundary_of(stated: BaseGeometry | FilePath, epsg: int | None) -> Boundary:
-    from aerotri.volume.boundary import boundary_of, read_boundary
+    from aerotri.volume.boundary import boundary_of_parts, read_boundary
 
     if isinstance(stated, str | os.PathLike):
         return read_boundary(os.fspath(stated), epsg)
-    return boundary_of(stated, "the polygon given")
+    return boundary_of_parts(stated, "the polygon given")
 
 
 def _areas(

@@ -12,6 +12,7 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted
 from aerotri.public.models import check_crs
+from aerotri.public.places import place_in_words
 from aerotri.public.run_steps import DSM, DTM, RESULT
 from aerotri.public.saving import RECORD
 from aerotri.public.stated import StatedAdjustment
@@ -220,7 +221,11 @@ def grid_of(epochs: Epochs) -> Grid:
     apart = left >= own.bounds[2] or right <= own.bounds[0] or bottom >= own.bounds[3] or top <= own.bounds[1]
     rows, columns = last_row - row + 1, last_column - column + 1
     if apart or rows < 3 or columns < 3:
-        raise InputError("the surfaces {} and {} do not meet".format(*names_of(epochs)), "check the CRS of both")
+        first, second = names_of(epochs)
+        where = [
+            f"{name} lies at {place_in_words(grid.bounds)}" for name, grid in zip((first, second), grids, strict=True)
+        ]
+        raise InputError(f"the surfaces {first} and {second} do not meet: {', '.join(where)}", "check the CRS of both")
     refuse_beyond_memory(
         float(BYTES_OF_CELL) * rows * columns,
         f"a change of {rows} × {columns} cells",

@@ -17,6 +17,7 @@ from aerotri.public.adjustment import Adjustment
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.dense_plots import DensePlots
 from aerotri.public.folders import paths_of, refuse_foreign_folder
+from aerotri.public.missing_photographs import missing_in_words, missing_photographs
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
 from aerotri.public.surfaces import Surface
@@ -47,7 +48,8 @@ class DenseSurface:
     ground : the ground without objects, None where it was not asked for.
     keeper : what removes the tiles when nobody uses them any more; None where they stay.
     head : of files. settings : every argument that was used, as dsm.json has them.
-    notes : what σ lacks, in sentences.
+    missing : photographs of the block that were not given.
+    notes : on the input and on what σ lacks, in sentences.
     """
 
     record: DenseOutcome
@@ -58,6 +60,7 @@ class DenseSurface:
     keeper: Spool | None = None
     head: Head = field(default_factory=Head)
     settings: list[dict[str, Any]] = field(default_factory=list)
+    missing: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     @cached_property
@@ -100,8 +103,10 @@ class DenseSurface:
         from aerotri.formats.results.dense import dense_json
 
         found = dense_json(self.record, self.block, self.crs, self.ground)
-        stated = {"adjustment": self.adjustment, "notes": list(self.notes), "settings": self.settings}
-        return self.head.as_dict() | found | stated
+        return self.head.as_dict() | found | {
+            "photographs_missing": list(self.missing), "adjustment": self.adjustment, "settings": self.settings,
+            "notes": list(self.notes),
+        }  # fmt: skip
 
     @property
     def plot(self) -> DensePlots:
@@ -236,7 +241,9 @@ def _measured(
     from aerotri.volume.shared import adjustment_key
 
     record = (result if isinstance(result, Adjustment) else open_result(result)).record
-    rows, paths = rows_and_files(record, photographs, chosen_rows(record, "all"))
+    wanted = chosen_rows(record, "all")
+    rows, paths = rows_and_files(record, photographs, wanted)
+    missing = missing_photographs(record, wanted, rows)
     key = adjustment_key(record)
     keeper = None
     if tiles is None:
@@ -252,9 +259,10 @@ def _measured(
     ground = bare_ground(outcome, settings.widest_object) if settings.ground else None
     block = record.result.block
     used = used_settings(dense_surface, settings, {"resolution": "m", "area": "m", "widest_object": "m"})
-    head, missing = Head(block.project, block.crs), missing_in_sigma(record)
-    notes = (missing,) if missing else ()
-    return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper, head, used, notes)
+    lacks = missing_in_sigma(record)
+    notes = (*missing_in_words(missing, photographs), *((lacks,) if lacks else ()))
+    head = Head(block.project, block.crs)
+    return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper, head, used, missing, notes)
 
 
 def _surface_parts(o: DenseOutcome) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:

@@ -1,4 +1,4 @@
-"""Plots of a dense surface: its shape, the σ of its matching, and its colours."""
+"""Plots of a dense surface: its shape, the σ of its heights, and its colours."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class DensePlots:
     block: str
 
     def surface(self) -> Figure:
-        """The surface, lit from the north-west as far as it was measured, and the σ of its matching."""
+        """The surface, lit from the north-west as far as it was measured, and the σ of its heights."""
         from aerotri.report.plots.terrain import plot_dense
 
         o, drawn = self.record, self._drawn
@@ -43,7 +43,7 @@ class DensePlots:
             for whole, part in ((z, tile.z), (matching, tile.sigma), (total, sigma)):
                 whole[place] = part[taken]
         is_local = o.photographs.places.frame is None
-        return plot_dense(drawn, z, matching, float(np.nanmedian(total)), self.block, is_local)
+        return plot_dense(drawn, z, total, float(np.nanmedian(matching)), self.block, is_local)
 
     def colours(self) -> Figure:
         """The measured cells in the colours of the photographs.

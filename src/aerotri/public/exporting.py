@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -14,6 +15,7 @@ from aerotri.conventions import FilePath, InputError, counted
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.change import MeasuredChange
 from aerotri.public.cloud_change import MeasuredCloudChange
+from aerotri.public.document_origins import ORIGINS, with_origin
 from aerotri.public.documents import (
     PDF_NAMES,
     DocumentKind,
@@ -114,7 +116,7 @@ def export(
     with stage_report(progress) as report:
         if to == "pdf" and is_volume_or_change(result):
             made = certificate(cast("MeasuredVolume", result), options, report)
-            return _keep(made, target, ())
+            return _keep(made, target, _origin(result, options, target), ())
         if isinstance(result, MeasuredVolume | MeasuredChange | MeasuredCloudChange) or is_volume_or_change(result):
             raise InputError(f"a volume or a change is not written as {to}", "use pdf, or give an adjustment")
         if not isinstance(result, Adjustment):
@@ -122,22 +124,37 @@ def export(
             result = open_result(result)
         if to == "pdf":
             _refuse_not_converged(result)
-            return _keep(adjustment_document(result, options, report), target, _doubt(result))
+            made = adjustment_document(result, options, report)
+            return _keep(made, target, _origin(result.folder or result, options, target), _doubt(result))
         _refuse_unfinished(result)
         with atomic_folder(target, own=WRITTEN[to]) as folder:
-            keep_written(target, folder, [name for name in EXPORT_NAMES if name not in WRITTEN[to]])
+            keep_written(target, folder, [name for name in (*EXPORT_NAMES, ORIGINS) if name not in WRITTEN[to]])
             notes = _write(result, folder, target, to, scale, flown, report)
     return Exported(target, WRITTEN[to], (*_doubt(result), *notes))
 
 
-def _keep(made: Made, target: Path, doubts: tuple[str, ...]) -> Exported:
-    """Write a document; other exports stay."""
+def _origin(result: object, options: DocumentOptions, target: Path) -> str:
+    """What tells the result of a document from others: its folder as seen from that of the document, or what it is."""
+    camera = f", camera {options.camera}" if options.camera else ""
+    if not isinstance(result, str | os.PathLike):
+        return f"{result!r}{camera}"
+    folder = Path(result).resolve()
+    try:
+        return os.path.relpath(folder, target.resolve()) + camera
+    except ValueError:  # on another drive
+        return f"{folder}{camera}"
+
+
+def _keep(made: Made, target: Path, origin: str, doubts: tuple[str, ...]) -> Exported:
+    """Write a document; other exports stay, and one of another result is not replaced."""
     from aerotri.formats.files.atomic import atomic_folder
     from aerotri.formats.files.ownership import keep_written
 
-    with atomic_folder(target, own=(made.name,)) as folder:
+    origins = with_origin(target, made.name, origin)
+    with atomic_folder(target, own=(made.name, ORIGINS)) as folder:
         keep_written(target, folder, [name for name in EXPORT_NAMES if name != made.name])
         (folder / made.name).write_bytes(made.pdf)
+        (folder / ORIGINS).write_text(origins, encoding="utf-8")
     return Exported(target, (made.name,), (*doubts, *made.notes))
 
 
@@ -162,7 +179,7 @@ def refuse_export(target: Path, to: str, scale: float | None) -> None:
         )
     if scale is not None and not 0.0 < scale < np.inf:
         raise InputError(f"a scale of {scale:g} is not possible", "give a number greater than 0")
-    refuse_foreign_folder(target, *EXPORT_NAMES)
+    refuse_foreign_folder(target, *EXPORT_NAMES, ORIGINS)
 
 
 def _refuse_unfinished(result: Adjustment) -> None:

@@ -18,6 +18,7 @@ from aerotri.public.adjustment import Adjustment
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.ground_of_block import off_the_ground
+from aerotri.public.missing_photographs import missing_in_words, missing_photographs
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
 from aerotri.public.terrain import ENDINGS
@@ -223,11 +224,13 @@ def _made(
     from aerotri.formats.files.atomic import atomic_folder, room_beside
     from aerotri.rasters.grids import cache_limited
     from aerotri.statistics.camera_field import missing_in_sigma
+    from aerotri.terrain.dtm import chosen_rows
     from aerotri.terrain.ortho.make import CACHE_BYTES, make_orthophoto
 
     in_threads = chosen(executor).kind == "threads"
     record = (result if isinstance(result, Adjustment) else open_result(result)).record
     taken = _photographs(record, photographs)
+    missing = missing_photographs(record, chosen_rows(record, "all"), taken[0])
     ground = surface.surface
     if tiles is not None:
         open_tiles(tiles, _stated(record, taken[1], ground, settings))
@@ -240,9 +243,11 @@ def _made(
         workers = None if in_threads else stack.enter_context(opened(executor, report.said))
         room = tiles if in_threads or tiles is not None else stack.enter_context(room_beside(out))
         made = make_orthophoto(record, taken, heights, sigma, settings, folder, report.stage, room, workers)
-        missing = missing_in_sigma(record)
-        notes += _blurred(made.blur, taken[1]) + ((missing,) if missing else ())
-        outcome, summary, points = _described(record, made, ground.label, settings, folder, notes)
+        lacks = missing_in_sigma(record)
+        notes += (*_blurred(made.blur, taken[1]), *((lacks,) if lacks else ()))
+        notes += missing_in_words(missing, photographs)
+        said = {"photographs_missing": list(missing), "notes": list(notes)}
+        outcome, summary, points = _described(record, made, ground.label, settings, folder, said)
         if plots:
             from aerotri.report.plots.rendering import save_plots
 
@@ -253,9 +258,9 @@ def _made(
 
 
 def _described(
-    record: Record, outcome: OrthoOutcome, name: str, settings: OrthoSettings, folder: Path, notes: tuple[str, ...]
+    record: Record, outcome: OrthoOutcome, name: str, settings: OrthoSettings, folder: Path, said: dict[str, Any]
 ) -> tuple[OrthoOutcome, dict[str, Any], tuple[Any, ...]]:
-    """Write seams and record beside the image."""
+    """Write seams and record beside the image; said : what else the record has."""
     from aerotri.formats.results.json_text import write_json
     from aerotri.formats.results.ortho import marked_points, ortho_json, write_seams
     from aerotri.rasters.grids import horizontal_crs
@@ -263,8 +268,8 @@ def _described(
     block = record.result.block
     write_seams(folder / SEAMS, outcome, horizontal_crs(block.crs))
     summary = Head(block.project, block.crs).as_dict() | ortho_json(outcome, block, name, settings.resampling)
-    summary["notes"] = list(notes)
     summary["settings"] = used_settings(orthophoto, settings, {"cell": "m", "area": "m"})
+    summary |= said
     write_json(folder / RECORD, summary)
     return outcome, summary, tuple(marked_points(outcome, block))
 

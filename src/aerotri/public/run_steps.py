@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -46,6 +47,11 @@ class Step:
     status: str = ""
     reason: str = ""
     seconds: float = 0.0
+
+    @property
+    def command(self) -> str:
+        """The command line, as a shell takes it: names with spaces in quotes."""
+        return shlex.join(("aerotri", *self.arguments))
 
 
 def is_block(source: Path) -> bool:

@@ -58,6 +58,7 @@ def run(
     density: float | None = None,
     density_sigma: float = 0.0,
     dense: bool = True,
+    resolution: float | None = None,
     plots: bool = True,
     go_on: bool = False,
     unmarked: Unmarked | None = None,
@@ -97,6 +98,7 @@ def run(
     density : t/m³, of all that is inside the boundary: gives tonnes.
     density_sigma : t/m³, its σ, common to all piles.
     dense : the dense surface and the orthophoto as well.
+    resolution : m, cell of the dense surface; two pixels on the ground where None.
     plots : draw the plots of the adjustment.
     go_on : go on after an adjustment that was rejected.
     unmarked : where control points are marked in no photograph, 'stop' after the tie points, or 'continue', as where
@@ -147,7 +149,8 @@ def run(
         },
         "terrain": {"interval": interval, "ground_within": boundary, "executor": elsewhere},
         "volume": {} if is_missing(boundary) else {"boundary": boundary, "base": base, "layer": layer, **sure},
-        "dense": {"executor": elsewhere}, "orthophoto": {"executor": elsewhere}, "accuracy": {},
+        "dense": {"resolution": resolution, "executor": elsewhere},
+        "orthophoto": {"executor": elsewhere}, "accuracy": {},
     }  # fmt: skip
     for verb, more in (further or {}).items():
         settings[verb] |= more

@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     from aerotri.volume.lasting import Lasting
 
 RECORD = "compare.json"
-OWN_NAMES = (RECORD, "difference.tif", "plots")
+DIFFERENCE = "difference.tif"
+OWN_NAMES = (RECORD, DIFFERENCE, "plots")
 GROSS = 4.0
 """NMAD from the median beyond which a difference does not tell the noise; chosen [C]: normal noise has none there."""
 
@@ -334,10 +335,12 @@ def _write(target: Path, found: SurfaceComparison, plots: bool) -> None:
     from aerotri.formats.files.atomic import atomic_folder
     from aerotri.formats.results.json_text import write_json
     from aerotri.rasters.grids import write_raster
+    from aerotri.rasters.surface_files import make_cloud_optimised
 
     c = found.record
     with atomic_folder(target, own=OWN_NAMES) as folder:
-        write_raster(folder / "difference.tif", c.difference, c.grid, found.crs, "test − control, m")
+        write_raster(folder / DIFFERENCE, c.difference, c.grid, found.crs, "test − control, m")
+        make_cloud_optimised(folder / DIFFERENCE)
         if plots:
             from aerotri.report.plots.rendering import save_plots
 

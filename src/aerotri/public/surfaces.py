@@ -244,12 +244,25 @@ def as_surface(surface: SurfaceLike, layer: Layer = LAYER) -> Surface:
     Parameters
     ----------
     layer : of a terrain model, or of the folder it was written to: with objects (dsm) or without (dtm).
+
+    Raises
+    ------
+    InputError
+        For a folder without it.
     """
     if isinstance(surface, Surface):
         return surface
     if isinstance(surface, str | os.PathLike):
         path = Path(surface)
-        return Surface(path / f"{layer}.tif" if path.is_dir() else path)
+        if not path.is_dir():
+            return Surface(path)
+        if not (path / f"{layer}.tif").is_file():
+            raise InputError(
+                f"holds no surface: there is no {layer}.tif",
+                "give the folder that dsm or dtm wrote, or a GeoTIFF",
+                path,
+            )
+        return Surface(path / f"{layer}.tif")
     from aerotri.public.dense import DenseSurface
 
     if isinstance(surface, DenseSurface):

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, counted
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.folders import paths_of, refuse_foreign_folder
+from aerotri.public.missing_photographs import missing_in_words, missing_photographs
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
 from aerotri.public.surfaces import Surface, dataset_of
@@ -81,6 +82,7 @@ class TerrainModel:
     notes : what was done with the input before and what σ lacks, in sentences.
     ground_within : name of the outline within which all is ground; '' where there is none.
     head : of files. settings : every argument that was used, as dtm.json has them.
+    missing : photographs of the block that were not given.
     """
 
     record: TerrainOutcome
@@ -91,6 +93,7 @@ class TerrainModel:
     ground_within: str = ""
     head: Head = field(default_factory=Head)
     settings: list[dict[str, Any]] = field(default_factory=list)
+    missing: tuple[str, ...] = ()
 
     @cached_property
     def dsm(self) -> Surface:
@@ -132,9 +135,11 @@ class TerrainModel:
         """The content of dtm.json: interval, counts of pickets, σ."""
         from aerotri.formats.results.terrain import terrain_json
 
-        stated = {"adjustment": self.adjustment, "ground_within": self.ground_within, "settings": self.settings}
-        found = terrain_json(self.record, self.block, self.crs)
-        return self.head.as_dict() | found | stated | {"notes": list(self.notes)}
+        stated = {
+            "photographs_missing": list(self.missing), "adjustment": self.adjustment,
+            "ground_within": self.ground_within, "settings": self.settings, "notes": list(self.notes),
+        }  # fmt: skip
+        return self.head.as_dict() | terrain_json(self.record, self.block, self.crs) | stated
 
     @property
     def plot(self) -> TerrainPlots:
@@ -296,7 +301,7 @@ def measure_terrain(
     from aerotri.execution.work import Workplace
     from aerotri.formats.files.spool import Spool
     from aerotri.statistics.camera_field import missing_in_sigma
-    from aerotri.terrain.dtm import make_terrain_model
+    from aerotri.terrain.dtm import chosen_rows, make_terrain_model
     from aerotri.volume.shared import adjustment_key
 
     settings.check()
@@ -312,11 +317,12 @@ def measure_terrain(
             notes = (*notes, outline.note) if outline.note else notes
         with opened(executor, report.said) as workers:
             outcome = make_terrain_model(record, plan, report.stage, Workplace(workers, spool.folder))
-    missing = missing_in_sigma(record)
-    notes = (*notes, missing) if missing else notes
+    lacks = missing_in_sigma(record)
+    notes = (*notes, lacks) if lacks else notes
     head = Head(block.project, block.crs)
+    missing = missing_photographs(record, chosen_rows(record, settings.subset), plan.rows)
     used = used_settings(terrain, settings, {"interval": "m", "cell": "m", "area": "m", "window": "px"})
-    return TerrainModel(outcome, str(block.name), block.crs, adjustment_key(record), notes, name, head, used)
+    return TerrainModel(outcome, str(block.name), block.crs, adjustment_key(record), notes, name, head, used, missing)
 
 
 def terrain_plan(
@@ -334,7 +340,8 @@ def terrain_plan(
     from aerotri.terrain.dtm import TerrainPlan, chosen_rows
     from aerotri.terrain.pickets import Area
 
-    rows, paths = rows_and_files(record, given, chosen_rows(record, settings.subset))
+    wanted = chosen_rows(record, settings.subset)
+    rows, paths = rows_and_files(record, given, wanted)
     s, area, lines, note = settings, None, (), ""
     if s.area is not None:
         area = Area(np.array(s.area[:2]), np.array(s.area[2:]))
@@ -345,7 +352,8 @@ def terrain_plan(
         step=s.step, area=area, window_px=s.window, threshold=s.threshold, agreeing=s.agreeing, edge=s.unused_edge,
         most_photographs=s.most_photographs, breaklines=lines, ideal=s.ideal,
     )  # fmt: skip
-    return plan, (note,) if note else ()
+    missing = missing_photographs(record, wanted, rows)
+    return plan, (*missing_in_words(missing, given), *((note,) if note else ()))
 
 
 def rows_and_files(record: Record, given: Sequence[Path], wanted: np.ndarray) -> tuple[np.ndarray, tuple[Path, ...]]:
@@ -364,7 +372,8 @@ def rows_and_files(record: Record, given: Sequence[Path], wanted: np.ndarray) ->
     rows = np.array([r for r in wanted.tolist() if r in path_of], dtype=np.int64)
     if len(rows) < 2:
         where = ", ".join(str(path) for path in given) or "nothing"
-        raise InputError(f"{len(rows)} photographs of the block are in {where}", "give the folder that holds them")
+        said = counted(len(rows), "photograph of the block is", "photographs of the block are")
+        raise InputError(f"{said} in {where}", "give the folder that holds them: two at least are matched")
     return rows, tuple(path_of[int(r)] for r in rows)
 
 

@@ -15,6 +15,7 @@ from aerotri.formats.files.spool import Spool
 from aerotri.observations.project import Project
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.ground_of_block import off_the_ground
+from aerotri.public.places import place_in_words
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.projects import project_of
 from aerotri.public.stated import StatedAdjustment
@@ -85,8 +86,8 @@ def volume(
     surface : raster of heights; or what `aerotri.terrain` returned, or the folder it was written to, whose pickets
         are used for σ; or what `aerotri.dense_surface` returned, or its folder: σ and noise length of its cells count.
     boundary : GeoPackage, GeoJSON or WKT file, WKT text, a shapely polygon, or polygons by their names; the whole
-        surface where None. Several polygons are piles: each is measured by itself, with a base of its own, and their
-        sum has a σ that knows what they share.
+        surface where None. Several polygons, and the parts of one feature, are piles: each is measured by itself,
+        with a base of its own, and their sum has a σ that knows what they share.
     layer : which surface of these: 'dsm' with objects (a pile is one), or 'dtm', the ground alone.
     base : height in m, 'level:H', 'plane:X,Y,Z;X,Y,Z;X,Y,Z', 'plane' (fitted to the boundary), 'boundary' (spline
         through it), 'lowest' (level of its lowest point), or another surface.
@@ -101,7 +102,8 @@ def volume(
     matching_sigma_um : µm, σ of an image coordinate of a picket; that of the adjustment where None.
     matching_window : m, side of the matching window on the ground; its cells share noise. None: the noise length of a
         dense surface, 0 of others.
-    base_sigma : m, σ of the height of the base, common to all of it.
+    base_sigma : m, σ of the height of the base, common to all of it; it takes the place of what the ground around a
+        spline through the boundary says.
     boundary_sigma : m, σ of either coordinate of a corner of the boundary.
     boundary_from : 'survey', where the boundary is known in space, as from a plan or measured on the ground; 'product',
         where it was drawn on the surface or the orthophoto of the same adjustment: it moves with them.
@@ -136,6 +138,11 @@ def volume(
     if boundary_from not in BOUNDARIES_FROM:
         raise InputError(
             f"a boundary from '{boundary_from}' is not known", f"choose one of {', '.join(BOUNDARIES_FROM)}"
+        )
+    if adjustment is None and boundary_from != SIGMA.boundary_from:
+        raise InputError(
+            f"boundary_from='{boundary_from}' belongs to an adjustment",
+            "give the adjustment that the surface was measured with: without σ it has no effect",
         )
     top, below = MeasuredSurface(surface, _stated(adjustment), pickets, layer), None
     if is_surface(base):
@@ -258,7 +265,8 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     ]
     content["settings"] = asked.settings
     outlines = outline_notes(boundary, min(reader.grid.cell_x, reader.grid.cell_y)) if _follows(asked.base) else ()
-    crs_notes = (reader.note, *(other.note for other in others), *systems, boundary.note, *outlines)
+    silent = "" if any(other.crs_code for other in others) else _without_crs(top, reader)
+    crs_notes = (reader.note, silent, *(other.note for other in others), *systems, boundary.note, *outlines)
     content["warnings"] = [*(text for text in crs_notes if text), *content["warnings"]]
     profiles = chosen_profiles(reader, base, boundary, volumes.sections)
     return MeasuredVolume(volumes, boundary, content, thickness, profiles, spool, notes, head)
@@ -276,6 +284,13 @@ def _stated_alone(
         return [], stated_sigma(reader, base, boundary, asked.options)
     each = [stated_sigma(reader, one.base, one.boundary, asked.options) for one in piles]
     return each, stated_sum(each)
+
+
+def _without_crs(top: MeasuredSurface, reader: Reader) -> str:
+    """What is taken for granted of a file that says no CRS, where no adjustment says that the block is local; or ''."""
+    if top.surface.path is None or top.adjustment is not None or reader.crs_code:
+        return ""
+    return f"{reader.path.name} does not say its coordinate system; X, Y and heights are taken for metres"
 
 
 def _follows(base: SurfaceLike | float) -> bool:
@@ -300,15 +315,9 @@ def _refuse_apart(boundary: Boundary, reader: Reader) -> None:
             where = f" ({reader.crs_code})" if reader.crs_code else ""
             note = f"; {boundary.note}" if boundary.note else ""
             raise InputError(
-                f"'{name}' does not meet the surface: it lies at {_place(polygon.bounds)}, the surface{where} at "
-                f"{_place(edges)}{note}", "check the CRS of both", reader.path,
+                f"'{name}' does not meet the surface: it lies at {place_in_words(polygon.bounds)}, the "
+                f"surface{where} at {place_in_words(edges)}{note}", "check the CRS of both", reader.path,
             )  # fmt: skip
-
-
-def _place(bounds: tuple[float, float, float, float]) -> str:
-    left, bottom, right, top = bounds
-    digits = 6 if max(abs(v) for v in bounds) <= 360.0 else 0
-    return f"X {left:.{digits}f} to {right:.{digits}f}, Y {bottom:.{digits}f} to {top:.{digits}f}"
 
 
 def _piles(asked: _Asked, base: Base | None, reader: Reader, boundary: Boundary) -> list[Pile]:
@@ -333,12 +342,12 @@ def _piles(asked: _Asked, base: Base | None, reader: Reader, boundary: Boundary)
 def _boundary(stated: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | None, reader: Reader) -> Boundary:
     from shapely.geometry.base import BaseGeometry
 
-    from aerotri.volume.boundary import boundary_of, boundary_of_grid, boundary_of_piles, read_boundary
+    from aerotri.volume.boundary import boundary_of_grid, boundary_of_parts, boundary_of_piles, read_boundary
 
     if stated is None:
         return boundary_of_grid(reader.grid)
     if isinstance(stated, BaseGeometry):
-        return boundary_of(stated, "the polygon given")
+        return boundary_of_parts(stated, "the polygon given")
     if isinstance(stated, Mapping):
         if not stated:
             raise InputError("no polygon is given", "give a polygon for every name")
@@ -401,6 +410,7 @@ def _volumes(
 ) -> tuple[Volumes, ThicknessMap]:
     """All methods, the raster of the thickness on the way, and its map."""
     from aerotri.rasters.grids import RasterWriter
+    from aerotri.rasters.surface_files import make_cloud_optimised
     from aerotri.volume.compute import compute_volumes
     from aerotri.volume.sums import Window, cells_within
     from aerotri.volume.thickness import ThicknessMeans
@@ -421,5 +431,6 @@ def _volumes(
             writer.write(window.row - row, window.column - column, inside.astype(np.float32))
 
         volumes = compute_volumes(reader, base, boundary, asked.method, asked.plan, keep, report.counted)
+    make_cloud_optimised(spool.folder / THICKNESS)
     spool.refuse_full()
     return volumes, means.map()

@@ -36,6 +36,17 @@ class _Quiet:
 
 
 _QUIET = _Quiet()
+MESSAGE = "Dataset has no geotransform"
+"""With which rasterio's warning begins."""
+
+
+def never_told() -> None:
+    """No warning for rasters without georeference in this process, for a program that has said so before its threads.
+
+    `warnings.catch_warnings` of another library, left in one thread, brings back the filters as they were before a
+    thread beside it came into `quietly`: numba does so where it compiles.
+    """
+    warnings.filterwarnings("ignore", message=MESSAGE)
 
 
 @contextmanager

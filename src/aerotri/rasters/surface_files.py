@@ -87,3 +87,25 @@ def _write_cog(
         raise
     finally:
         plain.unlink(missing_ok=True)
+
+
+def make_cloud_optimised(path: Path) -> None:
+    """A GeoTIFF that is whole, written anew as a cloud-optimised one: in tiles and with overviews.
+
+    Raises
+    ------
+    InputError
+        When the disk is full.
+    """
+    import rasterio.shutil
+
+    plain = path.with_name(f"{path.name}.plain")
+    path.replace(plain)
+    try:
+        with quietly():
+            rasterio.shutil.copy(plain, path, driver="COG", compress="DEFLATE", predictor="YES")
+    except Exception as error:
+        raise_full_disk(plain, error)
+        raise
+    finally:
+        plain.unlink(missing_ok=True)

@@ -28,6 +28,7 @@ ORTHO_JSON = (
     *HEAD,
     BLOCK,
     Item("surface", "text", "The surface that heights were taken from."),
+    Item("photographs_missing[]", "text", "Photographs of the block that were not among the files given."),
     Item("cell_m", "number", "Cell of the orthophoto.", "m"),
     Item("columns", "whole", "Cells from west to east."),
     Item("rows", "whole", "Cells from north to south."),

@@ -35,10 +35,12 @@ PICKETS = (
     Item("steps_aside", "whole", "How often it was moved because its first place could not be measured."),
     Item("model", "whole", "Number of the pair of photographs, −1 where all photographs were used."),
 )
+MISSING = (Item("photographs_missing[]", "text", "Photographs of the block that were not among the files given."),)
 DTM_JSON = (
     *HEAD,
     BLOCK,
     Item("photographs", "whole", "Photographs matched."),
+    *MISSING,
     Item("gsd_m", "number", "Size of a pixel on the ground.", "m"),
     Item("interval_m", "number", "Distance between the points measured (pickets).", "m"),
     Item("interval_source", "text", "Where the interval comes from."),
@@ -70,6 +72,7 @@ DSM_JSON = (
     *HEAD,
     BLOCK,
     Item("photographs", "whole", "Photographs matched."),
+    *MISSING,
     Item("gsd_m", "number", "Size of a pixel on the ground.", "m"),
     Item("cell_m", "number", "Cell of the rasters.", "m"),
     Item("cells", "object", "Number of cells."),

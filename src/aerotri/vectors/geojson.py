@@ -87,12 +87,30 @@ def _feature(entry: Any, number: int, path: Path) -> GeoJsonFeature:
     kind = geometry.get("type") if isinstance(geometry, dict) else None
     if not isinstance(kind, str):
         raise InputError(f"feature {number} has a geometry without a type", REMEDY, path)
+    if kind == "GeometryCollection":
+        geometry = _collected(geometry)
+        kind = geometry["type"]
     if kind not in DEPTH:
         return GeoJsonFeature(properties or {}, kind, [])
     found = _positions(geometry.get("coordinates"), DEPTH[kind])
     if found is None:
         raise InputError(f"the coordinates of feature {number} are those of no {kind}", "give finite numbers", path)
     return GeoJsonFeature(properties or {}, kind, found)
+
+
+def _collected(geometry: dict[str, Any]) -> dict[str, Any]:
+    """A collection of polygons as one of several parts; one that holds something else as it is."""
+    members = geometry.get("geometries")
+    if not isinstance(members, list) or not members:
+        return geometry
+    found: list[Any] = []
+    for one in members:
+        kind = one.get("type") if isinstance(one, dict) else None
+        if kind not in ("Polygon", "MultiPolygon"):
+            return geometry
+        own = one.get("coordinates")
+        found += [own] if kind == "Polygon" or not isinstance(own, list) else own
+    return {"type": "MultiPolygon", "coordinates": found}
 
 
 def _positions(value: Any, depth: int) -> list[Any] | None:

@@ -19,6 +19,8 @@ ENVELOPE_BYTES = (0, 32, 48, 48, 64)
 """Of a GeoPackage geometry, by the kind of envelope its header has [L: OGC 12-128]."""
 KINDS = {2: "LineString", 3: "Polygon", 5: "MultiLineString", 6: "MultiPolygon"}
 """Names of the kinds of geometry that have lines, by their code [L: OGC 06-103]."""
+COLLECTION = 7
+"""Code of a collection of shapes of any kind [L: OGC 06-103]."""
 PARTS = {5: 2, 6: 3}
 """What a geometry of several parts is made of [L: OGC 06-103]."""
 EXTRA_DIMENSIONS = {0: 0, 1: 1, 2: 1, 3: 2}
@@ -116,6 +118,8 @@ def _geometry(blob: Any) -> tuple[str, list[list[np.ndarray]]]:
         raise ValueError("its header is unknown")
     at = 8 + ENVELOPE_BYTES[envelope]
     _, kind, _, count = _head(blob, at)
+    if kind == COLLECTION:
+        return _collected(blob, at + 9, count)
     if kind not in KINDS:
         return "other", []
     if kind not in PARTS:
@@ -125,6 +129,21 @@ def _geometry(blob: Any) -> tuple[str, list[list[np.ndarray]]]:
         part, at = _part(blob, at, PARTS[kind])
         parts.append(part)
     return KINDS[kind], parts
+
+
+def _collected(blob: bytes, at: int, count: int) -> tuple[str, list[list[np.ndarray]]]:
+    """A collection of polygons as one of several parts; other collections are of no use here."""
+    parts: list[list[np.ndarray]] = []
+    for _ in range(count):
+        _, kind, _, members = _head(blob, at)
+        if KINDS.get(kind) not in ("Polygon", "MultiPolygon"):
+            return "other", []
+        several = KINDS[kind] == "MultiPolygon"
+        at += 9 if several else 0
+        for _ in range(members if several else 1):
+            part, at = _part(blob, at)
+            parts.append(part)
+    return "MultiPolygon", parts
 
 
 def _head(blob: bytes, at: int) -> tuple[str, int, int, int]:

@@ -18,7 +18,8 @@ from aerotri.vectors.geopackage import read_geopackage
 
 VECTOR_ENDINGS = (".geojson", ".json", ".gpkg")
 KINDS = ("Polygon", "MultiPolygon")
-WKT_REMEDY = "give POLYGON ((X Y, …)) or MULTIPOLYGON"
+WKT_KINDS = ("POLYGON", "MULTIPOLYGON", "GEOMETRYCOLLECTION")
+WKT_REMEDY = "give POLYGON ((X Y, …)) or MULTIPOLYGON (((X Y, …)), ((X Y, …))), whose parts are piles"
 FILE_REMEDY = "give a GeoPackage (.gpkg), GeoJSON (.geojson, .json), or a text file with WKT: POLYGON ((X Y, …))"
 
 Feature = tuple[Mapping[str, Any], BaseGeometry]
@@ -73,7 +74,7 @@ def polygon_of_wkt(text: str, path: Path | None = None) -> BaseGeometry:
     InputError
     """
     plain = text.partition(";")[2] if text.upper().lstrip().startswith("SRID=") else text
-    if not plain.lstrip().upper().startswith(("POLYGON", "MULTIPOLYGON")):
+    if not plain.lstrip().upper().startswith(WKT_KINDS):
         raise InputError("is no polygon", WKT_REMEDY if path is None else FILE_REMEDY, path)
     try:
         # numbers beyond all bounds are refused below
@@ -81,11 +82,21 @@ def polygon_of_wkt(text: str, path: Path | None = None) -> BaseGeometry:
             geometry = shapely.from_wkt(plain)
     except shapely.errors.ShapelyError as error:
         raise InputError(f"is no WKT: {str(error)[:200]}", WKT_REMEDY, path) from error
+    if geometry.geom_type == "GeometryCollection" and not geometry.is_empty:
+        geometry = _united_parts(geometry, path)
     if geometry.geom_type not in KINDS or geometry.is_empty:
         raise InputError("is no polygon", WKT_REMEDY, path)
     if not (np.abs(shapely.get_coordinates(geometry)) <= LARGEST_M).all():
         raise InputError("has a coordinate that is not possible", "give metres", path)
     return shapely.force_2d(geometry)
+
+
+def _united_parts(collection: BaseGeometry, path: Path | None) -> BaseGeometry:
+    """The polygons of a collection as one of several parts."""
+    parts = shapely.get_parts(collection)
+    if not all(part.geom_type in KINDS for part in parts):
+        raise InputError("holds other shapes than polygons", WKT_REMEDY, path)
+    return shapely.MultiPolygon([own for part in parts for own in shapely.get_parts(part)])
 
 
 def _geojson_features(path: Path, epsg: int | None) -> tuple[Sequence[tuple[Mapping[str, Any], Any]], VectorSystem]:

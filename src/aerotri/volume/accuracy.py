@@ -134,9 +134,9 @@ def volume_sigma(
         share, by name and value, by their covariance.
     """
     region = part.region
-    below = spline_variance(base, boundary, surface, region)
+    below = None if options.base_sigma > 0.0 else spline_variance(base, boundary, surface, region)
     stated = options.base_sigma * (boundary.area if region is None else region.area)
-    ground = stated**2 + (below or 0.0)
+    ground = stated**2 if below is None else below
     sign = 0 if region is None else region.sign
     edge = boundary_variance(surface, base, boundary, options.boundary_sigma, sign)
     notes = _notes(part, base_part, base, below is not None, options)
@@ -254,9 +254,11 @@ def _model_in_words(part: Part, parts: dict[str, float]) -> str:
         f"the errors of the photographs change {change}, more than noise explains" if change
         else "the residuals show image errors that the additional parameters leave"
     )  # fmt: skip
+    if in_digits(total, 2) == in_digits(noise, 2):
+        return f"{why}: with this model part the adjustment's share of σ stays {in_digits(total, 2)} m³"
     return (
-        f"{why}: with this model part the adjustment's share of σ is {in_digits(total, 4)} m³ instead of "
-        f"{in_digits(noise, 4)} m³"
+        f"{why}: with this model part the adjustment's share of σ is {in_digits(total, 2)} m³ instead of "
+        f"{in_digits(noise, 2)} m³"
     )
 
 
@@ -311,9 +313,13 @@ def _notes(part: Part, base_part: Part | None, base: Base, judged: bool, options
         notes.append("too few heights to tell how rough the ground is: interpolation is left out")
     if base_part is None and not isinstance(base, PlaneBase | SplineBase) and options.base_sigma <= 0.0:
         notes.append("the base counts as free of error: give its σ with --base-adjustment or --base-sigma")
-    if isinstance(base, SplineBase):
-        said = "the base is judged by the ground outside the boundary, taken for of the same kind as the ground below"
-        notes.append(said if judged else "too little ground outside the boundary to judge the base by")
+    if isinstance(base, SplineBase) and options.base_sigma <= 0.0:
+        said = (
+            "σ of the base is how well the ground outside the boundary, taken to be of the same kind, tells the ground "
+            "below; where it is known better, state --base-sigma or a surveyed base"
+        )
+        few = "too little ground outside the boundary to judge the base by: state --base-sigma"
+        notes.append(said if judged else few)
     if isinstance(base, PlaneBase) and base.nodes is None and options.base_sigma <= 0.0:
         notes.append(f"the base ({base.name}) counts as free of error: give its σ with --base-sigma")
     if options.boundary_from == "product":

@@ -15,7 +15,16 @@ from shapely.geometry.base import BaseGeometry
 from aerotri.conventions import InputError, in_digits
 from aerotri.rasters.grids import Grid, rasterise
 from aerotri.vectors.crs import vector_system
-from aerotri.vectors.polygons import FILE_REMEDY, VECTOR_ENDINGS, placed, polygon_features, polygon_of_wkt, srid_of_wkt
+from aerotri.vectors.polygons import (
+    FILE_REMEDY,
+    KINDS,
+    VECTOR_ENDINGS,
+    WKT_KINDS,
+    placed,
+    polygon_features,
+    polygon_of_wkt,
+    srid_of_wkt,
+)
 
 NAMES = ("name", "pile", "label", "title")
 """Attributes that name a polygon, in any case."""
@@ -108,21 +117,37 @@ def boundary_of(polygon: BaseGeometry, name: str, note: str = "", file: Path | N
     return Boundary(shapely.normalize(polygon), name, note)
 
 
+def boundary_of_parts(polygon: BaseGeometry, name: str, note: str = "", file: Path | None = None) -> Boundary:
+    """As `boundary_of`; the parts of a polygon of several are piles, 1, 2, …
+
+    Raises
+    ------
+    InputError
+    """
+    return boundary_of_piles([("", polygon)], name, note, file)
+
+
 def boundary_of_piles(
     piles: Sequence[tuple[str, BaseGeometry]], name: str, note: str = "", file: Path | None = None
 ) -> Boundary:
     """A boundary of several polygons, each with a name; those that overlap count together and not one by one.
+
+    One of several parts is a pile for every part: 'NAME 1', 'NAME 2', …
 
     Raises
     ------
     InputError
         When one has no area, crosses itself, or two have the same name.
     """
-    names = [own for own, _ in piles]
+    each = [
+        (own, boundary_of(part, own or name, file=file).polygon)
+        for stated, polygon in piles
+        for own, part in _each_part(stated, polygon)
+    ]
+    names = [own for own, _ in each]
     twice = {own for own in names if names.count(own) > 1}
     if twice:
         raise InputError(f"has two polygons called '{min(twice)}'", "give each its own name", file)
-    each = [(own, boundary_of(polygon, own, file=file).polygon) for own, polygon in piles]
     whole = _united([polygon for _, polygon in each], file)
     found = boundary_of(whole, name, note, file)
     if len(each) == 1:
@@ -132,6 +157,19 @@ def boundary_of_piles(
         said = f"its polygons overlap by {in_digits(overlap, 4)} m²: they count together, not one by one"
         return replace(found, note="; ".join(text for text in (note, said) if text))
     return replace(found, piles=tuple(each))
+
+
+def _each_part(name: str, polygon: BaseGeometry) -> list[tuple[str, BaseGeometry]]:
+    """The parts of a polygon by their names; one that is not valid as it is, so that it is refused as a whole."""
+    parts = shapely.get_parts(polygon).tolist()
+    if polygon.geom_type == "GeometryCollection":
+        if not all(part.geom_type in KINDS for part in parts):
+            raise InputError("holds other shapes than polygons", "give polygons only")
+        parts = [own for part in parts for own in shapely.get_parts(part).tolist()]
+        polygon = shapely.MultiPolygon(parts)
+    if len(parts) < 2 or not polygon.is_valid:
+        return [(name, polygon)]
+    return [(f"{name} {number}".lstrip(), part) for number, part in enumerate(parts, start=1)]
 
 
 def outline_notes(boundary: Boundary, cell: float) -> tuple[str, ...]:
@@ -194,13 +232,13 @@ def _attribute_of_names(attributes: Sequence[Mapping[str, Any]]) -> str:
 
 
 def read_boundary(source: str, epsg: int | None = None) -> Boundary:
-    """The boundary of a file (GeoPackage, GeoJSON, WKT) or of a WKT text; several polygons of a file are piles.
+    """The boundary of a file (GeoPackage, GeoJSON, WKT) or of a WKT text; several polygons are piles.
 
     Parameters
     ----------
     epsg : CRS of the surface; what names another one is brought to it, and GeoJSON is longitude and latitude.
     """
-    if source.lstrip().upper().startswith(("POLYGON", "MULTIPOLYGON", "SRID=")):
+    if source.lstrip().upper().startswith((*WKT_KINDS, "SRID=")):
         return _of_wkt(source, "the polygon given", epsg)
     path = Path(source)
     if path.suffix.lower() in VECTOR_ENDINGS:
@@ -211,7 +249,8 @@ def read_boundary(source: str, epsg: int | None = None) -> Boundary:
         names, said = _named([properties for properties, _ in features])
         note = "; ".join(text for text in (note, said and f"{path.name}: {said}") if text)
         if len(polygons) == 1:
-            return replace(boundary_of(polygons[0], path.name, note, path), polygon_name=names[0])
+            found = boundary_of_piles([(names[0], polygons[0])], path.name, note, path)
+            return found if found.piles else replace(found, polygon_name=names[0])
         numbered = [own or str(number) for number, own in enumerate(names, start=1)]
         return boundary_of_piles(list(zip(numbered, polygons, strict=True)), path.name, note, path)
     try:
@@ -223,7 +262,7 @@ def read_boundary(source: str, epsg: int | None = None) -> Boundary:
 
 def _of_wkt(text: str, name: str, epsg: int | None, path: Path | None = None) -> Boundary:
     system = vector_system(srid_of_wkt(text), epsg, name)
-    return boundary_of(placed(polygon_of_wkt(text, path), system, path), name, system.note, path)
+    return boundary_of_parts(placed(polygon_of_wkt(text, path), system, path), name, system.note, path)
 
 
 def _united(polygons: list[BaseGeometry], path: Path | None) -> BaseGeometry:

@@ -15,6 +15,6 @@ def test_numbers_of_a_step_have_words_and_units(tmp_path):
     step = {"name": "other", "folder": "ortho", "what": "Orthophoto", "status": "done", "reason": "", "seconds": 1.0,
             "arguments": ["ortho"]}  # fmt: skip
     page = run_page({"source": "photographs", "steps": [step], "seconds": 1.0}, tmp_path, Head())
-    for words in ("GSD [m]", "σ [m]: total: 95 % below", "area [m²]: surface", "bands"):
+    for words in ("GSD [m]", "σ of positions [m]: total: 95 % below", "area [m²]: surface", "bands"):
         assert f"<th>{words}</th>" in page
     assert "<th>gsd m</th>" not in page

@@ -1,4 +1,4 @@
-"""Pictures of a dense surface: as far as it was measured, with the σ of matching."""
+"""Pictures of a dense surface: as far as it was measured, with the σ of heights."""
 
 from types import SimpleNamespace
 
@@ -25,7 +25,7 @@ def test_the_picture_ends_where_measured_cells_end():
     np.testing.assert_array_equal(drawn, matching[10:20, 5:35])
     words = " ".join(text.get_text() for text in figure.findobj(Text))
     assert "0.077 m" in words
-    assert "σ of matching [m]" in words
+    assert "σ of Z [m]" in words
 
 
 def test_every_cell_that_is_drawn_is_of_one_tile():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from math import ceil, log10
 from typing import Any
 
 import numpy as np
@@ -36,6 +38,21 @@ def change_json(
         },
         "volumes": [_volume(one) for one in c.volumes], "warnings": list(notes),
     }  # fmt: skip
+
+
+def at_most(volume: Mapping[str, Any], of: str) -> float | None:
+    """m³ that what was gained or lost stays below, where it is nothing beside σ of net; None where it counts.
+
+    A few cells beyond the level of detection make a number with many digits that says nothing.
+    """
+    least = NOTHING_OF_NET * volume["sigma_net_m3"]
+    if of == "net" or not 0.0 < abs(volume[f"{of}_m3"]) + volume[f"sigma_{of}_m3"] < least:
+        return None
+    return float(f"{10.0 ** ceil(log10(least)):.1g}")
+
+
+NOTHING_OF_NET = 0.01
+"""Of σ of the net volume, below which a part of it is nothing; chosen [C]: two digits of σ do not show it."""
 
 
 def _volume(v: ChangedVolume) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from aerotri.volume.settings import Density
 SYSTEMATIC = "change of the volume by image errors, wrong − true, were the photographs used uncorrected"
 
 STATED = "what is stated about base and boundary alone; the errors of the surface are not in it"
+NO_SIGMA = "no σ: give --adjustment RESULT, the adjustment that the surface was measured with"
 BEYOND = "what it is expected to hold beyond that of the surface as given; not in it, counted in its σ"
 CURVATURE = "ground expected beyond the straight lines between the heights; part of σ as interpolation"
 
@@ -47,7 +48,8 @@ def volume_json(
     stated : instead of σ, where there is no adjustment.
     """
     v, s = volumes.chosen, volumes.sections
-    warnings = [*volumes.warnings, *([] if sigma is None else sigma.notes), *_stated_in_words(v, stated, density)]
+    in_words = _stated_in_words(v, stated, density) if sigma is None else [*sigma.notes]
+    warnings = [*volumes.warnings, *(in_words or [NO_SIGMA] if sigma is None else in_words)]
     return {
         "aerotri": __version__, "dtm": sources.dtm, "crs": sources.crs,
         "base": _base(base),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from aerotri.formats.results.change import at_most
 from aerotri.report.documents.figures import as_files
 from aerotri.report.documents.head import Context, document, signature_fields
 from aerotri.report.documents.messages import in_english, message_parts
@@ -28,22 +29,29 @@ def change_certificate(content: Mapping[str, Any], plots: Mapping[str, RenderedP
     context : language, date of computation, project.
     """
     words, whole = context.words, content["volumes"][-1]
-    result = [
-        (words(f"change.{of}"), known_to(words, whole[f"{of}_m3"], whole[f"sigma_{of}_m3"], "m³")) for of in KINDS
-    ]
+    result = [(words(f"change.{of}"), _known(words, whole, of)) for of in KINDS]
     parts: list[Part] = [heading(words("change.result")), pairs(result), paragraph(words("change.about"), small=True)]
     parts += [heading(words("change.areas")), _areas(content, words)]
     parts += [heading(words("change.measured")), pairs(_measured(content, words))]
     parts += [heading(words("volume.sigma")), _parts(content, words)]
     parts += [heading(words("change.alignment")), *_alignment(content, words)]
-    parts.append(signature(signature_fields(words)))
+    # what is signed has to include them
     parts += [*in_english(words), *message_parts(content["warnings"], words)]
+    parts.append(signature(signature_fields(words)))
     files, names = as_files(plots)
     if names:
         parts.append(heading(words("report.pictures")))
         parts += [picture(file, words(f"figure.{name}")) for name, file in names.items()]
     parts += argument_parts(content, words)
     return document(context, words("change.title"), content["crs"], content["aerotri"], parts, files)
+
+
+def _known(words: Words, volume: Mapping[str, Any], of: str) -> str:
+    """A volume and how sure it is; what is nothing beside σ of net as that."""
+    least = at_most(volume, of)
+    if least is None:
+        return known_to(words, volume[f"{of}_m3"], volume[f"sigma_{of}_m3"], "m³")
+    return f"< {words.plain(least, 1)} m³"
 
 
 def _areas(c: Mapping[str, Any], words: Words) -> Part:

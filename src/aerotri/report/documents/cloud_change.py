@@ -34,8 +34,9 @@ def cloud_change_certificate(
     parts += [heading(words("change.measured")), pairs(_measured(content, words))]
     parts += [heading(words("cloud.precision")), pairs(_precision(content, words))]
     parts += [heading(words("cloud.position")), paragraph(_position(content, words))]
-    parts.append(signature(signature_fields(words)))
+    # what is signed has to include them
     parts += [*in_english(words), *message_parts(content["warnings"], words)]
+    parts.append(signature(signature_fields(words)))
     files, names = as_files({name: plots[name] for name in PICTURES if name in plots})
     if names:
         parts.append(heading(words("report.pictures")))

@@ -45,9 +45,10 @@ def volume_certificate(content: Mapping[str, Any], plots: Mapping[str, RenderedP
         parts += [heading(words("volume.piles")), _piles(content, words)]
     parts += [heading(words("volume.measured")), pairs(_measured(content, context))]
     parts += [heading(words("volume.sigma")), *_sigma(content, words)]
-    parts.append(signature(signature_fields(words)))
     parts += [heading(words("volume.methods")), _methods(content, words), *in_english(words)]
+    # what is signed has to include them
     parts += message_parts(content["warnings"], words)
+    parts.append(signature(signature_fields(words)))
     files, names = as_files({name: plots[name] for name in PICTURES if name in plots})
     if names:
         parts.append(heading(words("report.pictures")))
@@ -203,7 +204,18 @@ def _parts_of_piles(c: Mapping[str, Any], words: Words) -> list[Part]:
 
 
 def _methods(c: Mapping[str, Any], words: Words) -> Part:
-    rows = [(words.term("method", one["method"]), amount(words, one["net_m3"]), amount(words, one["cut_m3"]),
-             amount(words, one["fill_m3"])) for one in c["methods"]]  # fmt: skip
+    rows = [
+        (words.term("method", one["method"]), *(_like(c, of, one[f"{of}_m3"], words) for of in ("net", "cut", "fill")))
+        for one in c["methods"]
+    ]
     keys = ("method", "net_m3", "cut_m3", "fill_m3")
     return table([words(f"volume.{key}") for key in keys], rows, words=1)
+
+
+def _like(c: Mapping[str, Any], of: str, value: float, words: Words) -> str:
+    """A volume of another method to the digits of the one that counts; without σ to six digits, a litre at least."""
+    sigma = _total(c) if of == "net" else sigma_of_side(c, of)
+    if sigma:
+        return words.with_sigma(value, sigma).partition(" ±")[0]
+    largest = max(abs(one[f"{of}_m3"]) for one in c["methods"])
+    return words.number(value, min(decimals(largest, 6), 3))

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from aerotri.formats.results.change import at_most
 from aerotri.report.pages.adjustment import data_address
 from aerotri.report.pages.head import page_environment, page_head, settings_rows
 from aerotri.report.plots.rendering import RenderedPlot
@@ -51,7 +52,9 @@ def _cards(v: Mapping[str, Any]) -> list[tuple[str, str, str]]:
 
 def _amount(v: Mapping[str, Any], of: str) -> str:
     """m³; without σ where no cell is beyond the level of detection: of nothing there is none."""
-    value, sigma = v[f"{of}_m3"], v[f"sigma_{of}_m3"]
+    value, sigma, least = v[f"{of}_m3"], v[f"sigma_{of}_m3"], at_most(v, of)
+    if least is not None:
+        return f"less than {least:g}"
     return "0" if value == 0.0 and sigma == 0.0 else with_sigma(value, sigma)
 
 
@@ -64,10 +67,22 @@ def _sure(c: Mapping[str, Any]) -> str:
     parts = c["volumes"][-1]["parts_net_m3"]
     words = ", ".join(f"{PARTS.get(name, name)} {two_digits(value)} m³" for name, value in parts.items() if value > 0.0)
     return (
-        f"A change of a single cell is told from noise (95 %) from {two_digits(1e3 * c['level_of_detection_m'])} mm on "
-        f"(median); {c['beyond_level_percent']:.1f} % of the cells are beyond. Where nothing changed, 5 % would be. "
-        f"Neighbouring cells share their noise over {two_digits(c['noise_length_m'])} m. σ of the net volume by part: "
-        f"{words}."
+        f"A single cell shows a change from {two_digits(1e3 * c['level_of_detection_m'])} mm on (95 %, median of all "
+        f"cells). {c['beyond_level_percent']:.1f} % of the cells are beyond it, where 5 % would be by chance. "
+        f"Neighbouring cells of the difference share their noise over {two_digits(c['noise_length_m'])} m: "
+        f"{_whose_noise(c)}. σ of the net volume by part: {words}."
+    )
+
+
+def _whose_noise(c: Mapping[str, Any]) -> str:
+    """Where the noise length is from: that of a difference is no noise length of one surface."""
+    if any(one["key"] == "noise_length" and one["value"] is not None for one in c.get("settings", ())):
+        return "as stated"
+    if c["alignment"] is None:
+        return "that of the matching, as the surfaces state it"
+    return (
+        "what the differences on stable ground show, with all errors that neighbours share, where it is longer than "
+        "the noise length of the surfaces, which is that of their matching alone"
     )
 
 

@@ -58,14 +58,14 @@ def _metres(value: float) -> str:
 
 
 def _sure(c: Mapping[str, Any]) -> str:
-    parts = ""
+    parts, level = "", _millimetres(c["level_of_detection_m"])
     if c["adjustments_m"] is not None:
         parts = f" The adjustments bring {_millimetres(c['adjustments_m'])} of it (median)."
     return (
-        f"A distance is told from noise (95 %) from {_millimetres(c['level_of_detection_m'])} on (median); "
-        f"{c['beyond_level_percent']:.1f} % of the places are beyond. Where nothing changed, 5 % would be. σ of a "
-        f"distance is {_millimetres(c['sigma_m'])} (median). {SIGMA_FROM[c['sigma_from']]}{parts} The position of one "
-        f"cloud to the other counts with {_millimetres(c['registration_m'])}."
+        f"A single place shows a change from {level} on (95 %, median of all places). "
+        f"{c['beyond_level_percent']:.1f} % of the places are beyond it, where 5 % would be by chance. σ of a "
+        f"distance is {_millimetres(c['sigma_m'])} (median). {SIGMA_FROM[c['sigma_from']]}{parts} Error of the "
+        f"position of one cloud against the other: {_millimetres(c['registration_m'])}."
     )
 
 

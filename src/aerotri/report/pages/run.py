@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -25,9 +26,23 @@ IN_PARTS = ("cells", "sigma_Z_m", "sigma_m", "area_m2")
 UNITS = {"m": "m", "m2": "m²", "m3": "m³", "px": "px", "um": "µm", "mm": "mm", "percent": "%"}
 WORDS = {"sigma": "σ", "q90": "90 % below", "q95": "95 % below", "gsd": "GSD", "crs": "CRS", "max": "largest"}
 """Of keys, as the page writes them."""
+LABELS = {
+    "crs": "coordinate system, code", "crs_name": "coordinate system", "height_system": "system of heights",
+    "photographs_mean": "photographs of a cell, mean", "tiles": "pieces it was measured in",
+    "ray_sigma_px": "σ of a matched image coordinate [px]",
+    "sigma0_rays": "rays of a point against their σ (1: as stated)",
+    "interval_m": "distance of the points [m]", "interval_source": "distance of the points from",
+    "ground_share": "share of the points that are ground", "ground_within": "all is ground within",
+    "of_one_adjustment": "surface of the same adjustment", "pixel_type": "type of the values",
+    "noise_length_m": "noise length of the matching [m]", "control": "control points", "check": "check points",
+    "sigma_Z_m": "σ of heights [m]", "sigma_m": "σ of positions [m]",
+}  # fmt: skip
+"""Of keys whose words alone do not say what they are."""
+TECHNICAL = ("aerotri", "computed", "adjustment", "tiles_resumed", "marking_page")
+"""Keys that are for programs."""
 PICTURES = (
     ("ortho", "orthophoto.png", "Orthophoto"),
-    ("dsm", "surface.png", "Dense surface: heights and the σ of matching"),
+    ("dsm", "surface.png", "Dense surface: heights and their σ"),
     ("dsm", "colours.png", "Dense surface in the colours of the photographs"),
     ("volume", "thickness.png", "Volume: height over the base"),
 )
@@ -137,7 +152,7 @@ def _step(step: dict[str, Any], folder: Path, shown: set[Path]) -> dict[str, Any
     return {
         **step,
         "reason": printable(step["reason"], 1000),
-        "command": printable("aerotri " + " ".join(step["arguments"]), 1000),
+        "command": printable(shlex.join(("aerotri", *step["arguments"])), 1000),
         "figures": _figures(folder) if done else [],
         "page": page,
         "file": f"{step['folder']}/{pages[0].name}" if pages else "",
@@ -151,16 +166,20 @@ def _figures(folder: Path) -> list[tuple[str, str]]:
     found = []
     for path in sorted(folder.glob("*.json")):
         content = _read(path)
-        found += [(_worded(key), _text(value)) for key, value in content.items() if _is_plain(value)]
+        shown = {key: value for key, value in content.items() if _is_plain(value) and key not in TECHNICAL}
+        found += [(_worded(key), _text(value)) for key, value in shown.items()]
         for key in IN_PARTS:
             if isinstance(content.get(key), dict):
                 found += _parts(_worded(key), content[key])
-        found += [("", printable(text, 1000)) for text in content.get("messages", []) if isinstance(text, str)]
+        said = [*content.get("messages", []), *content.get("notes", [])]
+        found += [("", printable(text, 1000)) for text in said if isinstance(text, str)]
     return found
 
 
 def _worded(key: str) -> str:
     """'sigma_m' → 'σ [m]', 'q95' → '95 % below'."""
+    if key in LABELS:
+        return LABELS[key]
     words = key.split("_")
     unit = UNITS.get(words[-1], "") if len(words) > 1 else ""
     text = " ".join(WORDS.get(word, word) for word in (words[:-1] if unit else words))
@@ -179,4 +198,8 @@ def _is_plain(value: Any) -> bool:
 
 
 def _text(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else printable(str(value), 300)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
+    return printable(str(value), 300)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from math import floor, log10
 from pathlib import Path
 from typing import Any
 
@@ -103,14 +104,19 @@ def _budget(c: Mapping[str, Any]) -> str:
         )
     beyond = [beyond_of_side(c, name) for name in ("cut", "fill")]
     if beyond[0] is not None and beyond[1] is not None:
-        more = [_number(beyond[0]), _number(beyond[1])]
         text += (
-            f" The base cuts the ground: beyond what the surface shows, cut is expected to hold {more[0]} m³ and fill "
-            f"{more[1]} m³. This is not in them; their σ counts it."
+            f" The base cuts the ground: the true cut is expected to be {_more(beyond[0], s['sigma_m3'])} and the true "
+            f"fill {_more(beyond[1], s['sigma_m3'])} than the surface shows. This is not in them; their σ counts it."
         )
     if not s["systematic"]["variants"]:
         return text + " No image errors were estimated, so what they do to the volume is not known."
     return text
+
+
+def _more(value: float, sigma: float) -> str:
+    """A volume by which the truth is larger or smaller, to the digits of σ."""
+    amount = with_sigma(abs(value), sigma).partition(" ±")[0]
+    return f"{amount} m³ {'more' if value >= 0.0 else 'less'}"
 
 
 def _piles(c: Mapping[str, Any]) -> list[tuple[str, ...]]:
@@ -147,8 +153,19 @@ def _mass_words(c: Mapping[str, Any]) -> str:
 
 
 def _methods(c: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    net, cut, fill = (_like(c, name) for name in ("net", "cut", "fill"))
     return [
-        (m["method"], _number(m["net_m3"]), _number(m["cut_m3"]), _number(m["fill_m3"]), _number(m["no_data_area_m2"]),
-         m["note"])
+        (m["method"], net(m["net_m3"]), cut(m["cut_m3"]), fill(m["fill_m3"]), _number(m["no_data_area_m2"]), m["note"])
         for m in c["methods"]
-    ]  # fmt: skip
+    ]
+
+
+def _like(c: Mapping[str, Any], name: str) -> Callable[[float], str]:
+    """How the volumes of other methods are written: to the digits of the one that counts, else their differences are
+    lost; without σ to six digits, a litre at least."""
+    sigma = (c["sigma"] or {}).get("sigma_m3") if name == "net" else sigma_of_side(c, name)
+    if sigma:
+        return lambda value: with_sigma(value, sigma).partition(" ±")[0]
+    largest = max(abs(m[f"{name}_m3"]) for m in c["methods"])
+    digits = min(max(0 if largest <= 0.0 else 5 - floor(log10(largest)), 0), 3)
+    return lambda value: f"{value:,.{digits}f}".replace(",", "\u2009").replace("-", "−")

@@ -87,6 +87,10 @@ def _mark(axes: Axes, points: Sequence[MarkedPoint]) -> None:
         axes.scatter(*xy.T, s=26, marker=marker, c=INK, edgecolors="white", linewidths=0.9, zorder=3)
 
 
+OPEN, ARM = 2.5, 8.0
+"""Cells from the middle of a cross at which its arms begin and end."""
+
+
 @styled
 def plot_points(outcome: OrthoOutcome, folder: Path, points: Sequence[MarkedPoint], block_name: str) -> Figure:
     """The orthophoto around control and check points; the crosses are their coordinates, the circles 2σ."""
@@ -94,7 +98,8 @@ def plot_points(outcome: OrthoOutcome, folder: Path, points: Sequence[MarkedPoin
     drawn = sorted(points, key=lambda p: p.role)[:MOST_POINTS]
     rows = -(-len(drawn) // IN_A_ROW)
     subtitle = (
-        f"{len(drawn)} of {len(points)} points; cross: given coordinates, circle: 2σ of the orthophoto; a side is "
+        f"{len(drawn)} of {len(points)} points; middle of the cross: given coordinates, circle: 2σ of the "
+        "orthophoto; a side is "
         f"{length_text(float(f'{(2 * AROUND + 1) * cell:.3g}'))}"
     )
     side, across = 1.15, 1.38
@@ -106,9 +111,11 @@ def plot_points(outcome: OrthoOutcome, folder: Path, points: Sequence[MarkedPoin
         part = read_mosaic(folder / IMAGE, (*first, 2 * AROUND + 1, 2 * AROUND + 1))
         axes.imshow(_shown(part), extent=(0.0, part.shape[2], part.shape[1], 0.0), interpolation="nearest")
         x, y = point.column - first[1], point.row - first[0]
-        for colour, wide in (("white", 2.4), (INK, 0.9)):
-            axes.plot([x - 6, x + 6], [y, y], color=colour, lw=wide)
-            axes.plot([x, x], [y - 6, y + 6], color=colour, lw=wide)
+        # open in the middle, so that the centre of the target is seen
+        for colour, wide in (("white", 2.4), (ACCENT, 1.0)):
+            for one in (-1.0, 1.0):
+                axes.plot([x + one * OPEN, x + one * ARM], [y, y], color=colour, lw=wide)
+                axes.plot([x, x], [y + one * OPEN, y + one * ARM], color=colour, lw=wide)
         if np.isfinite(point.sigma) and 2.0 * point.sigma / cell < AROUND:
             turn = np.linspace(0.0, 2.0 * np.pi, 60)
             reach = 2.0 * point.sigma / cell

@@ -76,25 +76,25 @@ def plot_heights(grid: Grid, z: np.ndarray, sigma: np.ndarray | None, name: str,
     return _plot_heights(grid, z, sigma, name, subtitle, is_local)
 
 
-def plot_dense(grid: Grid, z: np.ndarray, matching: np.ndarray, total: float, name: str, is_local: bool) -> Figure:
-    """A dense surface as far as it was measured, and the σ of its matching, which changes from cell to cell.
+def plot_dense(grid: Grid, z: np.ndarray, sigma: np.ndarray, matching: float, name: str, is_local: bool) -> Figure:
+    """A dense surface as far as it was measured, and the σ of its heights.
 
     Parameters
     ----------
-    z, matching : (rows, columns) m, NaN where not measured.
-    total : m, median σ of the heights with the part of the adjustment.
+    z, sigma : (rows, columns) m, NaN where not measured; σ of matching and adjustment together.
+    matching : m, median σ of matching alone.
     """
     known = np.isfinite(z)
     rows, columns = (between(known.sum(axis=axis)) for axis in (1, 0))
     part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    z, matching = z[part], matching[part]
+    z, sigma = z[part], sigma[part]
     subtitle = (
         f"cells of {length_text(float(f'{grid.cell_x:.3g}'))}; heights {np.nanmin(z):.1f} … {np.nanmax(z):.1f} m; "
-        f"white: not measured\nσ of matching, drawn: median {two_digits(float(np.nanmedian(matching)))} m; with the "
-        f"adjustment {two_digits(total)} m"
+        f"white: not measured\nσ of heights, drawn: median {two_digits(float(np.nanmedian(sigma)))} m; of matching "
+        f"alone {two_digits(matching)} m"
     )
     shown = grid.window(int(rows[0]), int(columns[0]), *z.shape)
-    return _plot_heights(shown, z, matching, name, subtitle, is_local, "σ of matching [m]")
+    return _plot_heights(shown, z, sigma, name, subtitle, is_local)
 
 
 def between(counts: np.ndarray) -> tuple[int, int]:

@@ -38,8 +38,8 @@ def _spline_weights(t):
 def resample(pixels, first, x, y, known, out):
     """Grey values at places, column x and row y of pixel centres; at the edge its pixels go on. Unknown ones are 0.
 
-    pixels : (·, ·) float32, coefficients of a spline surface through a photograph, from its column and row `first` on,
-    two more about all places. x, y, known, out : (rows, columns); x, y and out of float32.
+    pixels : (·, ·) float32, coefficients of a spline surface from column and row `first` of a photograph on, two more
+    about all places. x, y, known, out : (rows, columns); x, y and out of float32.
     """
     last_row, last_column = pixels.shape[0] - 1, pixels.shape[1] - 1
     for i in range(out.shape[0]):

@@ -37,8 +37,6 @@ FIELD_NODES, FIELD_SMOOTHING, STEEPEST, FIELD_ROUNDS = 48, (1.0, 2.0, 4.0, 8.0, 
 """Nodes along a side of the known parallaxes, σ of smoothing in nodes that is tried, largest change of parallax by
 column that an image is bent by, and rounds of the fixed point; chosen [C]: beyond .4 a bent image loses half of
 its pixels."""
-SPARE_AROUND = 8
-"""Pixels of a photograph beyond its places that are used; splines take seven."""
 MOST_PIXELS = 16_000_000
 """Of an epipolar image; chosen [C]: ten times a tile, and some 500 MB while it is matched. What is larger is seen from
 so flat that nothing could be matched."""
@@ -149,7 +147,7 @@ def _lattice(first: tuple[int, int], shape: tuple[int, int]) -> tuple[np.ndarray
 def _between_nodes(nodes: np.ndarray, shape: tuple[int, int], room: np.ndarray | None = None) -> np.ndarray:
     """(rows, columns, …) bilinear between the nodes of the lattice, right on average where they are curved.
 
-    In `room` where that is given.
+    room : where it is written, if given.
     """
     s = LATTICE_PX
     flat = nodes.copy()
@@ -233,25 +231,27 @@ def _resampled(
     pixel = place.project(k, centre + u @ g.rotation.T) * 0.5**g.level - 0.5
     pixels = store.level(k, g.level)
     nodes = np.nan_to_num(pixel, nan=-1e6).astype(np.float32)
-    # places lie between those of their nodes
-    last = np.array(pixels.shape[::-1])
-    first = np.clip(np.floor(nodes.min(axis=0)).astype(int) - SPARE_AROUND, 0, last)
-    last = np.clip(np.ceil(nodes.max(axis=0)).astype(int) + SPARE_AROUND, first, last)
     on_lattice = LATTICE_PX * size[0], LATTICE_PX * size[1], 2
-    used = last[1] - first[1], last[0] - first[0]
-    room = scratch.take(1, (int(np.prod(on_lattice) + np.prod(used)),))[0]
-    place_of = _between_nodes(nodes.reshape(*size, 2), g.shape, room[: np.prod(on_lattice)].reshape(on_lattice))
-    window = room[np.prod(on_lattice) :].reshape(used)
-    if window.size:
-        spline.of_surface(pixels[first[1] : last[1], first[0] : last[0]], window)
+    room = scratch.take(1, (int(np.prod(on_lattice)),))[0].reshape(on_lattice)
+    place_of = _between_nodes(nodes.reshape(*size, 2), g.shape, room)
     edge = place.view.edge * np.array([pixels.shape[1], pixels.shape[0]])
     x, y = place_of[:, :, 0], place_of[:, :, 1]
     known = np.empty((rows, columns), np.bool_)
-    most = pixels.shape[1] - 2.0 - edge[0], pixels.shape[0] - 2.0 - edge[1]
-    within(x, y, (edge[0] + 1.0, edge[1] + 1.0), most, known)
+    last = pixels.shape[1] - 2.0 - edge[0], pixels.shape[0] - 2.0 - edge[1]
+    within(x, y, (edge[0] + 1.0, edge[1] + 1.0), last, known)
+    if not known.any():
+        return np.zeros((rows, columns), np.float32), known
+    left, right = _reached(x, known, pixels.shape[1])
+    above, below = _reached(y, known, pixels.shape[0])
     out = np.empty((rows, columns), np.float32)
-    resample(window, first, x, y, known, out)
+    resample(spline.of_surface(pixels[above:below, left:right]), np.array([left, above]), x, y, known, out)
     return out, known
+
+
+def _reached(at: np.ndarray, known: np.ndarray, count: int) -> tuple[int, int]:
+    """First row or column of pixels, and the one after the last, that splines at the known places are made of."""
+    low, high, *_ = cv2.minMaxLoc(at, known.view(np.uint8))
+    return max(int(low) - spline.REACH - 1, 0), min(int(high) + spline.REACH + 3, count)
 
 
 def _mean_depth(g: EpipolarGeometry) -> float:

@@ -144,8 +144,10 @@ def _measured(calibration: Adjustment, plan: DensePlan, tell: Report, executor: 
     sizes = [block.cameras[c].size_px for c in block.images.camera[plan.rows].tolist()]
     store = GreyStore(plan.paths, sizes)
     gsd = float(np.median(photographs.gsd))
-    area = footprint(photographs) if plan.area is None else plan.area
+    shown = footprint(photographs)
+    area = shown if plan.area is None else plan.area
     cell = plan.resolution or CELLS_PER_GSD * gsd
+    _refuse_apart(area, shown, cell)
     finest = max(int(np.floor(np.log2(cell / (CELLS_PER_GSD * gsd)) + 1e-9)), 0)
     coarsest = max(min(MOST_LEVEL, int(np.log2(max(min(min(s) for s in sizes) / FEWEST_PIXELS, 1.0)))), finest)
     heights = range_of_prior(first_prior(calibration.result.points.xyz, area, gsd, coarsest + 1))
@@ -160,6 +162,28 @@ def _measured(calibration: Adjustment, plan: DensePlan, tell: Report, executor: 
     work = TileWork(photographs, store, grid, heights, options, files)
     resumed = do_windows(work, windows, executor, partial(tell, "surface"))
     return _outcome(calibration, plan, photographs, grid, windows, files, finest, resumed)
+
+
+def _refuse_apart(area: Area, shown: Area, cell: float) -> None:
+    """Refuse an area that the photographs do not show, and cells larger than what they show.
+
+    Raises
+    ------
+    InputError
+    """
+    if (area.low >= shown.high).any() or (area.high <= shown.low).any():
+        (left, bottom), (right, top) = shown.low, shown.high
+        raise InputError(
+            f"the area does not meet the photographs: they show X {left:.0f} to {right:.0f}, Y {bottom:.0f} to "
+            f"{top:.0f}",
+            "give X and Y of its lower left, then of its upper right corner, in the coordinates of the block",
+        )
+    size = np.minimum(area.high, shown.high) - np.maximum(area.low, shown.low)
+    if cell > size.min():
+        raise InputError(
+            f"a cell of {cell:g} m is larger than the ground to be measured, {size[0]:.0f} × {size[1]:.0f} m",
+            "give a smaller --resolution",
+        )
 
 
 def grid_of_area(area: Area, cell: float) -> Grid:

@@ -31,6 +31,6 @@ def along_rows(image: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
     return cv2.sepFilter2D(image, cv2.CV_32F, WEIGHTS, ONE, dst=out, borderType=cv2.BORDER_REFLECT_101)
 
 
-def of_surface(image: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
-    """(rows, columns) float32, coefficients of a spline along rows and columns; in `out` where that is given."""
-    return cv2.sepFilter2D(image, cv2.CV_32F, WEIGHTS, WEIGHTS, dst=out, borderType=cv2.BORDER_REFLECT_101)
+def of_surface(image: np.ndarray) -> np.ndarray:
+    """(rows, columns) float32, coefficients of a spline along rows and columns."""
+    return cv2.sepFilter2D(image, cv2.CV_32F, WEIGHTS, WEIGHTS, borderType=cv2.BORDER_REFLECT_101)

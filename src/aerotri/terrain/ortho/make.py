@@ -14,6 +14,7 @@ from aerotri.memory import refuse_beyond_memory
 from aerotri.rasters.bridging import BridgedReader
 from aerotri.rasters.grids import Grid, RasterReader, RasterWriter, cache_limited, horizontal_crs
 from aerotri.rasters.mosaics import write_mosaic
+from aerotri.rasters.surface_files import make_cloud_optimised
 from aerotri.results.adjustment import Adjustment
 from aerotri.terrain.dtm import rounded
 from aerotri.terrain.ortho.accuracy import HeightSigma, PlanAccuracy, plan_accuracy
@@ -136,6 +137,7 @@ def make_orthophoto(
     with RasterWriter(folder / SIGMAS, candidates.grid, crs=crs, options=COMPRESSED) as writer:
         writer.describe("σ of X and Y, m")
         writer.write(0, 0, accuracy.total.astype(np.float32))
+    make_cloud_optimised(folder / SIGMAS)
     return OrthoOutcome(
         grid, photographs, gsd, pixels.bands, pixels.dtype.name, candidates, blur, choice, balance, accuracy, cells,
         *counts,
