@@ -345,7 +345,7 @@ def test_a_spline_goes_through_the_pixels():
     image = np.random.default_rng(8).normal(size=(60, 70)).astype(np.float32)
     row, column = (np.ascontiguousarray(a, np.float32) for a in np.mgrid[10:50, 10:60])
     out = np.empty((40, 50), np.float32)
-    resample(spline.of_surface(image), column, row, np.ones((40, 50), np.bool_), out)
+    resample(spline.of_surface(image), np.array([0, 0]), column, row, np.ones((40, 50), np.bool_), out)
     np.testing.assert_allclose(out, image[10:50, 10:60], atol=0.01)
 
 

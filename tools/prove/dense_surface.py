@@ -25,11 +25,11 @@ Last result: tools/results/dense_surface.md.
 
 Steep cells of houses, few photographs, wall and trees have a table of their own as well (`--held`): eight draws on
 which no constant was chosen, together, with the smallest and the largest of a draw and what the mean of draws is good
-to (standard error over draws). Houses, few photographs, wall, trees, glass and water are four draws, those on which
-the constants were chosen. On noisy or weak texture semi-global matching alone scatters less: it smooths over more than
-a window. What is measured of the glass is its rim, whose windows see ground. With tie points of half a pixel σ holds
-the adjustment, which all cells of a draw share: std z is then the root mean square of z over all cells of twenty
-draws, on the same photographs, and semi-global matching is that of the first.
+to (standard error over draws). Houses, few photographs, wall, trees, glass and water are four draws, on the
+first two of which the constants were chosen. On noisy or weak texture semi-global matching alone scatters less: it
+smooths over more than a window. What is measured of the glass is its rim, whose windows see ground. With tie points of
+half a pixel σ holds the adjustment, which all cells of a draw share: std z is then the root mean square of z over all
+cells of twenty draws, on the same photographs, and semi-global matching is that of the first.
 """
 
 from __future__ import annotations

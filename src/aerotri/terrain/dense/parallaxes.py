@@ -127,7 +127,7 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
         if slow.any():
             move_rows(images.right, slow, images.geometry.lowest + 0.5 * images.geometry.count, moved)
             right = moved
-        align(spline.along_rows(right), value, known, left, aligned)
+        align(spline.along_rows(right, room), value, known, left, aligned)
         level = np.float32(aligned.mean())
         shift_windows(left, aligned, level, known, shift, across, variance, of_across, correlation)
         for rows in _bands(len(value)):

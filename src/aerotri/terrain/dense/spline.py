@@ -1,8 +1,8 @@
 """Coefficients of the cubic B-spline surface through the pixels of an image.
 
 Keys' cubic convolution moves what lies between two pixels: an image of wave number ω at the place t between them by
-ω²·t(1 − t)(1 − 2t)/6 [D], a hundredth of a pixel for the texture of photographs. The spline moves it by a tenth of
-that. Its coefficients are the image convolved with √3·z^|k|, z = √3 − 2 [L: Unser 1999].
+ω²·t(1 − t)(1 − 2t)/6 [D], a hundredth of a pixel for the texture of photographs. The spline moves it by less
+than a quarter of that. Its coefficients are the image convolved with √3·z^|k|, z = √3 − 2 [L: Unser 1999].
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ def _weights() -> np.ndarray:
 WEIGHTS, ONE = _weights().astype(np.float32), np.ones(1, np.float32)
 
 
-def along_rows(image: np.ndarray) -> np.ndarray:
-    """(rows, columns) float32, coefficients of a spline along every row."""
-    return cv2.sepFilter2D(image, cv2.CV_32F, WEIGHTS, ONE, borderType=cv2.BORDER_REFLECT_101)
+def along_rows(image: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+    """(rows, columns) float32, coefficients of a spline along every row; in `out` where that is given."""
+    return cv2.sepFilter2D(image, cv2.CV_32F, WEIGHTS, ONE, dst=out, borderType=cv2.BORDER_REFLECT_101)
 
 
 def of_surface(image: np.ndarray) -> np.ndarray:
