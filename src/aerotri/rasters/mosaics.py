@@ -61,8 +61,9 @@ def write_mosaic(
     transform = Affine(grid.cell_x, 0.0, grid.left, 0.0, -grid.cell_y, grid.top)
     made: dict[str, Any] = {"tiled": True, "blockxsize": TILE, "blockysize": TILE, "bigtiff": "IF_SAFER"}
     made |= {"interleave": "pixel", "SPARSE_OK": True} | _colours(len(bands)) if average else {"SPARSE_OK": True}
-    # the resampling of overviews leaves the edge of what is known as it is
-    cloud = {"compress": "DEFLATE", "level": LEVEL, "predictor": "YES", "bigtiff": "IF_SAFER",
+    # the resampling of overviews leaves the edge of what is known as it is; numbers that are the same over large areas
+    # need no predictor
+    cloud = {"compress": "DEFLATE", "level": LEVEL, "predictor": "YES" if average else "NO", "bigtiff": "IF_SAFER",
              "num_threads": "ALL_CPUS", "overview_resampling": "AVERAGE" if average else "NEAREST"}  # fmt: skip
     try:
         with quietly(), rasterio.Env(GDAL_CACHEMAX=cache):
