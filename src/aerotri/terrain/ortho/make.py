@@ -46,7 +46,7 @@ CACHE_BYTES = 64 << 20
 photographs, what tiles take and the coarse cells the command stays below 2 GB, however many photographs there are."""
 BYTES_OF_COARSE_CELL = 900
 """All that a coarse cell has, at the stage that takes most; 3 bands."""
-KEPT_BESIDE_SEAMS = 256 << 20
+KEPT_BESIDE_SEAMS = 320 << 20
 """Bytes of photographs that stay in memory while seams are laid [C], which takes most of what coarse cells need."""
 PHOTOGRAPH_BAND, BRIDGED_BAND = "number of the photograph", "1: the height was not measured but bridged"
 Report = Callable[[str, float], None]
