@@ -250,6 +250,7 @@ def main() -> None:
     print("\n".join(lines))
     if options.out:
         name = "quarry_dense.md" if options.dense else "quarry.md"
+        options.out.mkdir(parents=True, exist_ok=True)
         (options.out / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
