@@ -12,10 +12,10 @@ Last result:
 
     | base | photographs of a cell | scatter over σ, all areas | smallest | largest |
     |---|---|---|---|---|
-    | level:0 | own | 1.04 | 0.91 | 1.45 |
-    | level:0 | two | 0.80 | 0.59 | 1.09 |
-    | boundary | own | 1.01 | 0.35 | 1.49 |
-    | boundary | two | 0.71 | 0.14 | 1.74 |
+    | level:0 | own | 1.04 | 0.91 | 1.44 |
+    | level:0 | two | 0.80 | 0.60 | 1.08 |
+    | boundary | own | 1.00 | 0.30 | 1.48 |
+    | boundary | two | 0.70 | 0.13 | 1.69 |
 
     99 % band of one area with 20 flights: 0.60 … 1.43
 """
