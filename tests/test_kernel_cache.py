@@ -92,7 +92,7 @@ def test_a_folder_that_cannot_be_written_stops_nothing(tmp_path):
 
 def test_what_was_kept_of_other_kernels_is_not_taken(environment):
     """The code of a kernel holds that of kernels in other files: when these change, it is compiled again."""
-    changed = f"from aerotri import kernel_cache; kernel_cache._kernels_as_written = lambda: 'changed'; {CALL}"
+    changed = f"from aerotri import kernel_cache; kernel_cache.digest_of_sources = lambda _: 'changed'; {CALL}"
     said = [begun(environment, line).communicate(timeout=120)[0].split() for line in (CALL, CALL, changed)]
     assert said == [["8.0", "1"], ["8.0", "0"], ["8.0", "1"]]
 

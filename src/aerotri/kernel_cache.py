@@ -12,12 +12,12 @@ import pickle
 import time
 import warnings
 from contextlib import suppress
-from functools import cache
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+from aerotri.source_digest import digest_of_sources
 
 PATIENCE_S = 60.0
 """For another process to compile a kernel, before it is compiled here; chosen [C]: ten times what the longest takes."""
@@ -36,16 +36,6 @@ UNREADABLE = (
     ValueError,
 )
 """What reading a file raises that may not be read, is damaged, or whose types have other names or modules now."""
-
-
-@cache
-def _kernels_as_written() -> str:
-    """A digest of all files of kernels and of the options they are compiled with."""
-    package, digest = Path(__file__).parent, sha256()
-    for pattern in KERNEL_FILES:
-        for path in sorted(package.rglob(pattern)):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
 
 
 class KeptFiles(IndexDataCacheFile):
@@ -93,7 +83,7 @@ class SharedCache(FunctionCache):
         super().__init__(function)
         self._lock: int | None = None
         # numba looks at the function's own file; kernels of other files stand in its code as well
-        stamp = self._impl.locator.get_source_stamp(), _kernels_as_written()
+        stamp = self._impl.locator.get_source_stamp(), digest_of_sources(KERNEL_FILES)
         self._cache_file = KeptFiles(self._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:

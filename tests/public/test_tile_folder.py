@@ -7,7 +7,9 @@ import os
 import pytest
 
 from aerotri.conventions import InputError
+from aerotri.public import tile_folder
 from aerotri.public.tile_folder import STATED, fingerprints, open_tiles
+from aerotri.source_digest import digest_of_sources
 
 
 def test_other_files_are_left_as_they_are(tmp_path):
@@ -47,6 +49,22 @@ def test_links_to_what_is_not_there_are_replaced_or_told(tmp_path):
     (tmp_path / "lost").symlink_to(tmp_path / "nowhere")
     with pytest.raises(InputError, match="lost: cannot be written: it is a link to what is not there"):
         open_tiles(tmp_path / "lost", {"cell": 1.0})
+
+
+def test_tiles_of_other_code_are_measured_again(tmp_path, monkeypatch):
+    open_tiles(tmp_path, {"cell": 1.0})
+    (tmp_path / "level0_0_0.npz").write_bytes(b"a tile")
+    open_tiles(tmp_path, {"cell": 1.0})
+    assert (tmp_path / "level0_0_0.npz").exists()
+    monkeypatch.setattr(tile_folder, "digest_of_sources", lambda patterns: f"other {patterns}")
+    open_tiles(tmp_path, {"cell": 1.0})
+    assert not (tmp_path / "level0_0_0.npz").exists()
+
+
+def test_the_code_that_makes_tiles_is_looked_at():
+    """Every pattern finds modules: a folder that has got another name would go unnoticed."""
+    for pattern in tile_folder.SOURCES:
+        assert digest_of_sources((pattern,)) != digest_of_sources(("no such module",))
 
 
 @pytest.mark.parametrize("damage", [b"\xff\xfe\x80", b"{", b""])

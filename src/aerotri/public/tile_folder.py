@@ -14,8 +14,11 @@ from aerotri.conventions import InputError
 from aerotri.formats.files.ownership import told_by
 from aerotri.formats.files.places import not_written
 from aerotri.formats.files.work_place import held
+from aerotri.source_digest import digest_of_sources
 from aerotri.version import __version__
 
+SOURCES = ("terrain/**/*.py", "rasters/**/*.py")
+"""Modules that make tiles: those of another version are not mixed with tiles of this one."""
 STATED = "tiles.json"
 SUFFIXES = (".npz", ".part", ".shared")
 
@@ -64,7 +67,8 @@ def open_tiles(folder: Path, stated: Mapping[str, Any]) -> None:
     InputError
         When it holds other files, or cannot be written to.
     """
-    text = json.dumps({**stated, "aerotri": __version__}, sort_keys=True)
+    version = {"aerotri": __version__, "sources": digest_of_sources(SOURCES)}
+    text = json.dumps({**stated, **version}, sort_keys=True)
     mark = hashlib.sha256(text.encode()).hexdigest()
     there = folder / STATED
     try:
