@@ -296,8 +296,10 @@ def spline_variance(base: Base, boundary: Boundary, surface: Surface, region: Re
     ----------
     region : what counts of the boundary; None: all.
     """
-    around = ground_around(base, boundary, surface) if isinstance(base, SplineBase) else None
-    if around is None or not isinstance(base, SplineBase):
+    if not isinstance(base, SplineBase):
+        return None
+    around = ground_around(base, boundary, surface)
+    if around is None:
         return None
     places, weight = quadrature_of(boundary) if region is None else (region.places, region.weight)
     integral = base.integral if region is None else integral_of_spline(base, places, weight)

@@ -61,11 +61,6 @@ class Roughness:
         sign = -1.0 if int(self.exponent) % 2 == 0 else 1.0
         return sign * self.s**2 * np.asarray(distance) ** (2.0 * self.exponent)
 
-    def contrast_variance(self, xy: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """(…,) m², variance of Σλz at places (…, n, 2); the weights (…, n) annul what H asks for."""
-        gap = np.linalg.norm(xy[..., :, None, :] - xy[..., None, :, :], axis=-1)
-        return np.einsum("...i,...ij,...j->...", weights, self.covariance(gap), weights)
-
 
 @dataclass(frozen=True)
 class Between:
@@ -96,15 +91,13 @@ def roughness_of_pickets(
     if len(rows) > MOST_NEIGHBOURHOODS:
         rows = np.random.default_rng(seed).choice(rows, MOST_NEIGHBOURHOODS, replace=False)
     near = xyz[np.asarray(KDTree(xyz[:, :2]).query(xyz[rows, :2], AROUND)[1])]
-    return _likeliest(near[:, :, :2], near[:, :, 2], noise, SMOOTHEST)
+    return _likeliest(near[:, :, :2], near[:, :, 2], noise)
 
 
-def roughness_of_cells(
-    z: np.ndarray, grid: Grid, step: int = 1, smoothest: float = SMOOTHEST, seed: int = 0
-) -> Roughness | None:
-    """The roughness of a surface of cells, (rows, columns) m with NaN where not known, at a spacing of `step` cells."""
-    j, i = (step * v.ravel() for v in np.meshgrid(np.arange(5), np.arange(5)))
-    rows, columns = (max(n - 4 * step, 0) for n in z.shape)
+def roughness_of_cells(z: np.ndarray, grid: Grid, seed: int = 0) -> Roughness | None:
+    """The roughness of a surface of cells, (rows, columns) m with NaN where not known."""
+    j, i = (v.ravel() for v in np.meshgrid(np.arange(5), np.arange(5)))
+    rows, columns = (max(n - 4, 0) for n in z.shape)
     known = np.logical_and.reduce([np.isfinite(z[a:, b:][:rows, :columns]) for a, b in zip(i, j, strict=True)])
     places = np.argwhere(known)
     if len(places) < ENOUGH:
@@ -112,7 +105,7 @@ def roughness_of_cells(
     if len(places) > MOST_NEIGHBOURHOODS:
         places = places[np.random.default_rng(seed).choice(len(places), MOST_NEIGHBOURHOODS, replace=False)]
     xy = np.column_stack([j * grid.cell_x, i * grid.cell_y])[None].astype(float)
-    return _likeliest(xy, z[places[:, :1] + i, places[:, 1:] + j], 0.0, smoothest)
+    return _likeliest(xy, z[places[:, :1] + i, places[:, 1:] + j], 0.0)
 
 
 def curvature_of_cells(z: np.ndarray, grid: Grid) -> float:
@@ -290,7 +283,7 @@ def places_within(n: int, within: tuple[float, float, float]) -> np.ndarray:
     return np.column_stack([first, 1.0 - first.sum(axis=1)])
 
 
-def _likeliest(xy: np.ndarray, z: np.ndarray, noise: float, smoothest: float) -> Roughness:
+def _likeliest(xy: np.ndarray, z: np.ndarray, noise: float) -> Roughness:
     """From neighbourhoods: places (n or 1, m, 2), heights (n, m)."""
     at = xy - xy.mean(axis=1, keepdims=True)
     size = float(np.median(np.abs(at).max(axis=(1, 2))))
@@ -322,7 +315,7 @@ def _likeliest(xy: np.ndarray, z: np.ndarray, noise: float, smoothest: float) ->
     def of_exponent(h: float) -> float:
         return fit(h)[0]
 
-    found = minimize_scalar(of_exponent, bounds=(ROUGHEST, smoothest), method="bounded", options={"xatol": 0.01})
+    found = minimize_scalar(of_exponent, bounds=(ROUGHEST, SMOOTHEST), method="bounded", options={"xatol": 0.01})
     exponent = _not_whole(float(found.x))  # pyright: ignore[reportAttributeAccessIssue]
     return Roughness(float(np.sqrt(fit(exponent)[1])) / size**exponent, exponent)
 
