@@ -82,8 +82,8 @@ def test_a_stated_sigma_of_the_base_takes_the_place_of_what_the_ground_tells(pla
     judged = run(place, tmp_path / "judged", given(place, "boundary"))
     stated = run(place, tmp_path / "stated", given(place, "boundary"), SigmaOptions(base_sigma=0.02))
     assert stated["sigma"]["parts_m3"]["base"] == pytest.approx(0.02 * stated["boundary"]["area_m2"])
-    assert any("how well the ground outside" in text for text in judged["warnings"])
-    assert not any("how well the ground outside" in text for text in stated["warnings"])
+    assert any("estimated from the ground outside" in text for text in judged["warnings"])
+    assert not any("estimated from the ground outside" in text for text in stated["warnings"])
 
 
 def test_two_surfaces_of_one_adjustment_cancel_what_they_share(place, tmp_path):

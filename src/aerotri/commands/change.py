@@ -67,8 +67,8 @@ def _cloud_summary(c: dict[str, Any]) -> list[str]:
     lines = [
         f"{c['with_distance']} of {c['core_points']} places every {c['spacing_m']:.3g} m have a distance; cylinders of "
         f"{c['cylinder_m']:.3g} m, normals from {c['normal_m']:.3g} m, at most {c['reach_m']:.3g} m away",
-        f"σ of a distance (from {SIGMA_FROM[c['sigma_from']]}): median {c['sigma_m']:.3f} m; error of the "
-        f"position of one cloud against the other {c['registration_m']:.3f} m",
+        f"σ of a distance (from {SIGMA_FROM[c['sigma_from']]}): median {c['sigma_m']:.3f} m; registration "
+        f"error (position of one cloud relative to the other) {c['registration_m']:.3f} m",
         f"level of detection (95 %) {c['level_of_detection_m']:.3f} m in the median, {c['beyond_level_percent']:.1f} % "
         "of the places beyond it",
     ]

@@ -317,8 +317,8 @@ def _notes(part: Part, base_part: Part | None, base: Base, judged: bool, options
         notes.append("the base counts as free of error: give its σ with --base-adjustment or --base-sigma")
     if isinstance(base, SplineBase) and options.base_sigma <= 0.0:
         said = (
-            "σ of the base is how well the ground outside the boundary, taken to be of the same kind, tells the ground "
-            "below; where it is known better, state --base-sigma or a surveyed base"
+            "σ of the base is estimated from the ground outside the boundary and holds where the ground below is of "
+            "the same kind; if you know that ground better, give --base-sigma or a surveyed base"
         )
         few = "too little ground outside the boundary to judge the base by: state --base-sigma"
         notes.append(said if judged else few)

@@ -24,7 +24,7 @@ SYSTEMATIC = "change of the volume by image errors, wrong − true, were the pho
 STATED = "what is stated about base and boundary alone; the errors of the surface are not in it"
 NO_SIGMA = "no σ: give --adjustment RESULT, the adjustment that the surface was measured with"
 BEYOND = "what it is expected to hold beyond that of the surface as given; not in it, counted in its σ"
-CURVATURE = "ground expected beyond the straight lines between the heights; part of σ as interpolation"
+CURVATURE = "terrain between the measured points (estimated, not added); its error is part of σ as interpolation"
 
 
 @dataclass(frozen=True)

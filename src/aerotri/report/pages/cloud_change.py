@@ -64,8 +64,8 @@ def _sure(c: Mapping[str, Any]) -> str:
     return (
         f"A single place shows a change from {level} on (95 %, median of all places). "
         f"{c['beyond_level_percent']:.1f} % of the places are beyond it, where 5 % would be by chance. σ of a "
-        f"distance is {_millimetres(c['sigma_m'])} (median). {SIGMA_FROM[c['sigma_from']]}{parts} Error of the "
-        f"position of one cloud against the other: {_millimetres(c['registration_m'])}."
+        f"distance is {_millimetres(c['sigma_m'])} (median). {SIGMA_FROM[c['sigma_from']]}{parts} Registration "
+        f"error (position of one cloud relative to the other): {_millimetres(c['registration_m'])}."
     )
 
 

@@ -30,7 +30,7 @@ LABELS = {
     "crs": "coordinate system, code", "crs_name": "coordinate system", "height_system": "system of heights",
     "photographs_mean": "photographs of a cell, mean", "tiles": "pieces it was measured in",
     "ray_sigma_px": "σ of a matched image coordinate [px]",
-    "sigma0_rays": "rays of a point against their σ (1: as stated)",
+    "sigma0_rays": "σ0 of the intersection of rays (1: as stated)",
     "interval_m": "distance of the points [m]", "interval_source": "distance of the points from",
     "ground_share": "share of the points that are ground", "ground_within": "all is ground within",
     "of_one_adjustment": "surface of the same adjustment", "pixel_type": "type of the values",
