@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -136,6 +136,13 @@ Seed = Annotated[
         help="Number that random choices start from; the same gives the same outcome.", rich_help_panel=METHOD
     ),
 ]
+
+
+def cell_of_surface(help: str, panel: str) -> Any:
+    """The option for the cells of a dense surface, by either of its names."""
+    return typer.Option("--resolution", "--cell", min=1e-6, help=help, rich_help_panel=panel)
+
+
 SurfaceLayer = Annotated[
     str,
     typer.Option(

@@ -34,6 +34,7 @@ from aerotri.cli.options import (
     SurfaceLayer,
     SystemOfPhotographs,
     Workers,
+    cell_of_surface,
 )
 from aerotri.execution.choice import THREADS
 from aerotri.tie_points.settings import DEFAULTS
@@ -92,14 +93,7 @@ def run(
         bool, typer.Option(help="The dense surface and the orthophoto as well.", rich_help_panel=SURFACE)
     ] = True,
     resolution: Annotated[
-        float | None,
-        typer.Option(
-            "--resolution",
-            "--cell",
-            min=1e-6,
-            help="Cell of the dense surface, m. Default: two pixels on the ground.",
-            rich_help_panel=SURFACE,
-        ),
+        float | None, cell_of_surface("Cell of the dense surface, m. Default: two pixels on the ground.", SURFACE)
     ] = None,
     executor: Workers = THREADS,
     plots: Annotated[bool, typer.Option(help="Draw the plots of the adjustment.", rich_help_panel=OUTPUT)] = True,

@@ -8,7 +8,18 @@ from typing import Annotated, Any, cast
 import typer
 
 from aerotri.cli.app import app, predict
-from aerotri.cli.options import ARGUMENTS, INPUT, METHOD, OUTPUT, TERRAIN, Json, ProjectOf, ResultFolder, Workers
+from aerotri.cli.options import (
+    ARGUMENTS,
+    INPUT,
+    METHOD,
+    OUTPUT,
+    TERRAIN,
+    Json,
+    ProjectOf,
+    ResultFolder,
+    Workers,
+    cell_of_surface,
+)  # fmt: skip
 from aerotri.execution.choice import THREADS
 from aerotri.terrain.settings import (
     ALIGNMENT,
@@ -170,14 +181,7 @@ def dsm(
         ),
     ] = None,
     resolution: Annotated[
-        float | None,
-        typer.Option(
-            "--resolution",
-            "--cell",
-            min=1e-6,
-            help="Cell of the surface, m. Default: two pixels on the ground.",
-            rich_help_panel=GRID,
-        ),
+        float | None, cell_of_surface("Cell of the surface, m. Default: two pixels on the ground.", GRID)
     ] = DENSE_DEFAULTS.resolution,
     area: Annotated[
         tuple[float, float, float, float] | None,
