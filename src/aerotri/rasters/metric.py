@@ -241,7 +241,7 @@ def refuse_other_units(reader: RasterReader) -> None:
 
 
 def refuse_plan_not_in_metres(crs: str, name: str) -> None:
-    """Refuse heights in memory whose CRS, 'EPSG:n', does not count its plan in metres: their cells are taken for metres.
+    """Refuse heights in memory whose CRS, 'EPSG:n', does not count in metres: their cells are taken for metres.
 
     Raises
     ------
@@ -264,7 +264,7 @@ def refuse_plan_not_in_metres(crs: str, name: str) -> None:
 
 
 def metric_target(readers: Sequence[MetricReader | HeldRaster]) -> str | None:
-    """'EPSG:n' that several rasters can be brought to: the first plan that counts in metres; None where none states one.
+    """'EPSG:n' that several rasters can be brought to, the first of theirs in metres; None where none states one.
 
     Where no file has been in metres, the system that the first of them was brought to.
     """
