@@ -59,14 +59,20 @@ class ChangePlots:
     areas: tuple[Boundary, ...]
 
     def difference(self) -> Figure:
-        """Map of what changed beyond the level of detection, and of σ."""
+        """Map of what changed beyond the level of detection."""
         from aerotri.report.plots.change import plot_change
 
         return plot_change(self.record, self.summary, self.areas)
 
+    def difference_sigma(self) -> Figure:
+        """Map of the σ of the difference."""
+        from aerotri.report.plots.change import plot_change_sigma
+
+        return plot_change_sigma(self.record, self.summary, self.areas)
+
     def all(self) -> dict[str, Figure]:
         """Every plot of the page by the name of its file."""
-        return {"difference": self.difference()}
+        return {"difference": self.difference(), "difference_sigma": self.difference_sigma()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -337,6 +343,7 @@ def _write(target: Path, found: MeasuredChange, plots: bool) -> None:
             from aerotri.report.pages.change import write_change_page
             from aerotri.report.plots.rendering import save_plots
 
-            save_translated("difference", found.plot.difference, folder / "plots")
+            for name in ("difference", "difference_sigma"):
+                save_translated(name, getattr(found.plot, name), folder / "plots")
             write_change_page(found.summary, save_plots(found.plot.all(), folder / "plots"), folder / PAGE, found.head)
         write_json(folder / RECORD, found.summary)

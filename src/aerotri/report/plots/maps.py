@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
@@ -29,6 +30,8 @@ HIGHEST = 6.4
 """Inches that a map is high at most: with its title it fits a printed page."""
 LEFT, BOTTOM, SCALE, ABOVE = 0.95, 0.65, 1.0, 0.8
 """Inches beside a map for coordinates and for the scale, and below and above it."""
+KEY, LINE = 0.35, 0.17
+"""Inches of a key below a map, and of one more line above it."""
 NAME_SIZE = 8.0
 """Points, of names on maps."""
 RINGS = (0.10, 0.22, 0.38, 0.58)
@@ -38,14 +41,15 @@ MARK = 0.08
 """Inches from the middle of a mark to its edge, which no name covers."""
 
 
-def single_map(title: str, subtitle: str, bounds: Bounds, is_local: bool) -> tuple[Figure, Axes]:
-    """A figure with one map as wide as a column, its coordinates, and room for a scale."""
+def single_map(title: str, subtitle: str, bounds: Bounds, is_local: bool, key: bool = False) -> tuple[Figure, Axes]:
+    """A figure with one map as wide as a column, its coordinates, and room for a scale; key : room for one below."""
     left, bottom, right, top = bounds
     ratio = (top - bottom) / (right - left)
     width = min(WIDTH - LEFT - SCALE, HIGHEST / ratio)
-    height = width * ratio
-    figure = new_figure(height + BOTTOM + ABOVE, title, subtitle)
-    axes = axes_at(figure, LEFT, BOTTOM, width, height)
+    height, below = width * ratio, BOTTOM + (KEY if key else 0.0)
+    above = ABOVE + LINE * subtitle.count("\n")
+    figure = new_figure(height + below + above, title, subtitle)
+    axes = axes_at(figure, LEFT, below, width, height)
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
     coordinate_axes(axes, width, height, coordinate_names(is_local))
@@ -61,6 +65,12 @@ def extent_of(bounds: Bounds) -> Bounds:
     """Left, right, bottom, top, as `imshow` has it."""
     left, bottom, right, top = bounds
     return left, right, bottom, top
+
+
+def key_below(figure: Figure, handles: Sequence[Artist]) -> None:
+    """What the signs of a map mean, below it."""
+    place = 0.9 / WIDTH, 0.2 / float(figure.get_size_inches()[1])
+    figure.legend(handles=list(handles), loc="center left", bbox_to_anchor=place, ncols=len(handles))
 
 
 def scale_beside(figure: Figure, axes: Axes, image: ScalarMappable, label: str) -> Colorbar:
