@@ -24,24 +24,21 @@ RESULT = "result"
 """Folder of the adjustment."""
 LARGEST_PLOTS = 12
 """Plots of a step that has no report of its own."""
-IN_PARTS = ("cells", "sigma_Z_m", "sigma_m", "area_m2")
-"""Figures of surfaces and orthophotos that consist of several."""
+IN_PARTS = ("sigma_Z_m",)
+"""Figures that consist of several."""
 UNITS = {"m": "m", "m2": "m²", "m3": "m³", "px": "px", "um": "µm", "mm": "mm", "percent": "%"}
 WORDS = {"sigma": "σ", "q90": "90 % below", "q95": "95 % below", "gsd": "GSD", "crs": "CRS", "max": "largest"}
 """Of keys, as the page writes them."""
 LABELS = {
     "crs": "coordinate system, code", "crs_name": "coordinate system", "height_system": "system of heights",
-    "photographs_mean": "photographs of a cell, mean", "tiles": "pieces it was measured in",
     "ray_sigma_px": "σ of a matched image coordinate [px]",
     "sigma0_rays": "σ0 of the intersection of rays (1: as stated)",
     "interval_m": "distance of the points [m]", "interval_source": "distance of the points from",
     "ground_share": "share of the points that are ground", "ground_within": "all is ground within",
-    "of_one_adjustment": "surface of the same adjustment", "pixel_type": "type of the values",
-    "noise_length_m": "noise length of the matching [m]", "control": "control points", "check": "check points",
-    "sigma_Z_m": "σ of heights [m]", "sigma_m": "σ of positions [m]",
+    "control": "control points", "check": "check points", "sigma_Z_m": "σ of heights [m]",
 }  # fmt: skip
 """Of keys whose words alone do not say what they are."""
-TECHNICAL = ("aerotri", "computed", "adjustment", "tiles_resumed", "marking_page")
+TECHNICAL = ("aerotri", "computed", "adjustment", "marking_page")
 """Keys that are for programs."""
 PICTURES = (
     ("ortho", "orthophoto.png", "Orthophoto"),
@@ -58,8 +55,6 @@ CAPTIONS = {
     }
 }
 """Of the plots of steps that have no page of their own."""
-
-
 PRODUCTS: Mapping[str, Callable[[Mapping[str, Any]], ProductParts]] = {"dsm": dense_parts, "ortho": ortho_parts}
 """Steps whose own pages consist of parts that stand on this one as well."""
 
