@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from aerotri.commands.adjust import folder_name
-from aerotri.commands.console import Console
+from aerotri.commands.console import Console, written
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
@@ -43,5 +43,5 @@ def run_accuracy(
     if as_json:
         print(json_text(found.content))
     else:
-        console.lines([*accuracy_lines(found.record), f"Written to {target}, page: {target / 'accuracy.html'}"])
+        console.lines([*accuracy_lines(found.record), written(target, "accuracy.html")])
     return 1 if found.record.verdict == "rejected" else 0

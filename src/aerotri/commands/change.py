@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.commands.console import Console
+from aerotri.commands.console import Console, written
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
@@ -33,7 +33,7 @@ def run_change(
     if as_json:
         print(json_text(found.summary))
     else:
-        console.lines([*_summary(found.summary), f"Written to {target}"])
+        console.lines([*_summary(found.summary), written(target, "change.html")])
 
 
 def run_cloud_change(
@@ -54,7 +54,7 @@ def run_cloud_change(
     if as_json:
         print(json_text(found.summary))
     else:
-        console.lines([*_cloud_summary(found.summary), f"Written to {target}"])
+        console.lines([*_cloud_summary(found.summary), written(target, "change.html")])
 
 
 SIGMA_FROM = {

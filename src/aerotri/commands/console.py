@@ -18,6 +18,12 @@ FEWEST_S, FEWEST_SHARE = 3.0, 0.03
 """Before so much is done the time left is not told: a first piece may be of any size."""
 
 
+def written(target: Path, page: str) -> str:
+    """The line that says where a result is, and its page where one was written."""
+    place = target / page
+    return f"Written to {target}" + (f", page: {place}" if place.exists() else "")
+
+
 class TimeLeft:
     """The time left of a piece of work, by the pace of the later half of what is done.
 

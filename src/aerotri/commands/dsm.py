@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.commands.console import Console
+from aerotri.commands.console import Console, written
 from aerotri.commands.results import reopened
 from aerotri.conventions import counted
 from aerotri.execution.choice import THREADS, chosen
@@ -48,7 +48,7 @@ def run_dsm(
 
 def outcome_lines(found: DenseSurface, target: Path) -> list[str]:
     """What the user reads of the surface."""
-    return [*(f"note: {note}" for note in found.notes), *_summary(found.summary), f"Written to {target}"]
+    return [*(f"note: {note}" for note in found.notes), *_summary(found.summary), written(target, "dsm.html")]
 
 
 def _summary(content: dict[str, Any]) -> list[str]:

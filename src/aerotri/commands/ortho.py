@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aerotri.commands.console import Console
+from aerotri.commands.console import Console, written
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError, counted
 from aerotri.execution.choice import THREADS, chosen
@@ -82,4 +82,4 @@ def outcome_lines(found: Orthophoto) -> list[str]:
             f"seams: {seams['length_m']:.0f} m; colours on both sides differ by {100 * seams['difference']:.1f} % of "
             f"white, {100 * seams['difference_of_best']:.1f} % between the best photographs"
         )
-    return [*lines, f"Written to {found.folder}"]
+    return [*lines, written(found.folder, "ortho.html")]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from aerotri.commands.console import Console
+from aerotri.commands.console import Console, written
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
@@ -23,7 +23,7 @@ def run_plan(area: str, out: Path | None, asked: dict[str, Any], as_json: bool) 
     if as_json:
         print(json_text(found.summary))
         return
-    console.lines([*plan_lines(found.summary), f"Written to {target}"])
+    console.lines([*plan_lines(found.summary), written(target, "plan.html")])
 
 
 def plan_lines(c: dict[str, Any]) -> list[str]:

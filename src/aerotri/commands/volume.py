@@ -7,7 +7,7 @@ from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.commands.console import Console
+from aerotri.commands.console import Console, written
 from aerotri.conventions import InputError, in_digits
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
@@ -125,7 +125,7 @@ def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
             added = with_sigma(one["value_m3"], one["sigma_m3"], signed=True)
             lines.append(f"systematic image errors, {ORIENTED[one['variant']]}: {where} {added} m³")
     lines += [f"  {one['method']:<24} net {in_digits(one['net_m3'], 6)} m³" for one in c["methods"]]
-    return [*lines, *(f"note: {text}" for text in c["warnings"]), f"Written to {target}"]
+    return [*lines, *(f"note: {text}" for text in c["warnings"]), written(target, "volume.html")]
 
 
 @dataclass(frozen=True)
