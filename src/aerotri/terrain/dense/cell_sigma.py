@@ -1,16 +1,20 @@
-"""σ of the cells of a fused surface: noise of the matching, roughness, and steps."""
+"""σ of the cells of a fused surface: noise of the matching, roughness, steps, and the edge."""
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
-from aerotri.terrain.dense.cell_scale import CellScale, sum_about
+from aerotri.terrain.dense.cell_scale import CellScale, square, sum_about
 from aerotri.terrain.dense.steps import STEP_SIGMAS, others_seen, step_sigma
 
 NOISE_SHARE, ROUGH_SHARE = 0.77, 0.62
 """Of the σ of the matching, and of the scatter of heights about their neighbours, that are σ of a cell; chosen [C]: the
 errors of two draws of rendered scenes are .93 to 1.1 times their σ with them, on smooth, noisy and rough ground alike
 (tools/prove/dense_surface.py)."""
+EDGE_PX = 0.07
+"""σ of parallax that cells at the edge of a surface, or of a hole, have besides; chosen [C] with the others: their
+windows see in part what could not be matched."""
 
 
 def cell_sigma(
@@ -25,7 +29,13 @@ def cell_sigma(
     """
     rough = roughness(z, scale.lag, np.maximum(scale.pixel, np.sqrt(6.0) * STEP_SIGMAS * noise))
     beside = step_sigma(z, noise, others_seen(z, heights, sigmas, scale), scale)
-    return np.sqrt((NOISE_SHARE * noise) ** 2 + (ROUGH_SHARE * rough) ** 2 + beside**2)
+    edge = EDGE_PX * scale.pixel * at_edge(z)
+    return np.sqrt((NOISE_SHARE * noise) ** 2 + (ROUGH_SHARE * rough) ** 2 + beside**2 + edge**2)
+
+
+def at_edge(z: np.ndarray) -> np.ndarray:
+    """(rows, columns) whether one of the eight neighbours of a cell has no height; what lies outside does not count."""
+    return cv2.erode(np.isfinite(z).view(np.uint8), square(3)) == 0
 
 
 def roughness(z: np.ndarray, lag: int, step: np.ndarray) -> np.ndarray:

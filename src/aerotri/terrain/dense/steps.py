@@ -13,22 +13,22 @@ import numpy as np
 
 from aerotri.terrain.dense.cell_scale import CellScale, middle_height, square, sum_about
 
-STEP_SHARE, STRAIGHT_SHARE, ALONE_SHARE = 0.54, 0.16, 0.36
-"""Of a step that is σ of the cells next to it, where steps about them run in all directions, as crowns of trees have
-them, where they run straight, as at houses and walls, and where one pair alone saw the cell, either way; chosen [C]
-with the rest of this module on rendered houses, walls, trees and few photographs (tools/prove/dense_surface.py)."""
-FAR_SHARE = 0.31
-"""The same of a step further away, where few pairs saw the cell, and of one that a hole may hide; chosen [C]: most such
-cells are right, some have the height of the other side."""
-CROOKED, STRAIGHT = 0.4, 0.8
-"""Straightness up to which a step counts whole, and from which on as a straight one."""
+STEP_SHARE = 0.28
+"""Of a step about a cell that is σ of the height, where it may be that of the other side: where few pairs agree on it,
+and where steps next to the cell run in all directions, as crowns of trees have them. Chosen [C] with the rest of this
+module on rendered houses, walls, trees and few photographs (tools/prove/dense_surface.py)."""
+BETWEEN_SHARE = 0.2
+"""Of a step next to a cell that is the most by which a height between both sides counts; chosen [C]."""
+CROOKED, STRAIGHT, STRAIGHT_COUNTS = 0.4, 0.8, 0.1
+"""Straightness up to which a step counts whole where several pairs agree, and from which on it counts a tenth: they
+seldom all miss a long edge; chosen [C]."""
 FLATTEST_PX, STEEPEST_PX = 0.01, 2.0
 """Of parallax from cell to cell: less is rounding; a higher step tells its direction no better."""
-LEAST_STEP_PX, LEAST_HIDDEN_PX = 0.9, 0.5
-"""Of parallax, from which on heights differ by a step, and where a hole may hide the rest of it; chosen [C]."""
-SEVERAL, BLURRED_STEP_PX = 3, 1.35
-"""Pairs that agree on a height, and the largest step, of parallax, that counts where so many do; chosen [C]: what they
-see alike is seldom the height of the other side, but a window across a step blurs it for all of them."""
+LEAST_STEP_PX, LEAST_NEXT_PX, LEAST_HIDDEN_PX = 0.9, 0.7, 0.5
+"""Of parallax, from which on heights within a window of the matching differ by a step, how much of it has to be next to
+a cell, and where a hole may hide the rest of it; chosen [C]."""
+SEVERAL = 3
+"""Pairs that agree on a height; chosen [C]: what they see alike is seldom the height of the other side."""
 STEP_SIGMAS = 6.0
 """σ of the noise that a step is larger than: the range of some twenty cells reaches five."""
 CONTRADICTED_SIGMAS = 4.0
@@ -77,23 +77,26 @@ def others_seen(z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: C
 def step_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
     """(rows, columns) m, σ of a cell by the step that it lies beside; 0 where there is none.
 
-    A share of the step: of one next to the cell by its direction and the pairs that agree on the height, of one further
-    away, or hidden by a hole, less.
+    Two things are wrong beside steps. The height may be that of the other side: a share of the step, where few pairs
+    agree on the height or the step is crooked. And a window across the step blurs it for all pairs: the height then
+    lies between both sides, and its distance from the nearer one is σ.
     """
     known = np.isfinite(z)
     if not known.any():
         return np.zeros(z.shape)
     above = np.where(known, z - middle_height(z), 0.0).astype(np.float32)
-    next_to, far = _steps(z, above, noise, seen, scale)
-    share = _share_of_next(above, known, seen, scale) if next_to.any() else np.zeros(())
-    most = np.where(seen.agreeing < SEVERAL, np.inf, BLURRED_STEP_PX * scale.pixel)
-    return np.where(known, np.maximum(share * np.minimum(next_to, most), FAR_SHARE * np.minimum(far, most)), 0.0)
+    steps = _steps(z, above, noise, seen, scale)
+    few = seen.agreeing < SEVERAL
+    counts = np.where(few, 1.0, _crooked(above, known, scale) if steps.next_to.any() else 0.0)
+    other_side = STEP_SHARE * np.maximum(counts * steps.next_to, steps.far)
+    between = np.minimum(steps.between, BETWEEN_SHARE * steps.next_to)
+    return np.where(known, np.hypot(other_side, between), 0.0)
 
 
-def _share_of_next(above: np.ndarray, known: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
-    """(rows, columns) of a step next to a cell, by its direction and whether one pair alone saw the cell."""
-    straight = np.clip((straightness(above, known, scale) - CROOKED) / (STRAIGHT - CROOKED), 0.0, 1.0)
-    return np.where(seen.agreeing < 2, ALONE_SHARE, STEP_SHARE + (STRAIGHT_SHARE - STEP_SHARE) * straight)
+def _crooked(above: np.ndarray, known: np.ndarray, scale: CellScale) -> np.ndarray:
+    """(rows, columns) what of a step counts by how straight steps run about the cell, to 1 where they are crooked."""
+    crooked = (STRAIGHT - straightness(above, known, scale)) / (STRAIGHT - CROOKED)
+    return np.clip(crooked, STRAIGHT_COUNTS, 1.0)
 
 
 def straightness(above: np.ndarray, known: np.ndarray, scale: CellScale) -> np.ndarray:
@@ -118,17 +121,31 @@ def straightness(above: np.ndarray, known: np.ndarray, scale: CellScale) -> np.n
     return np.hypot(xx - yy, 2.0 * xy) / np.maximum(xx + yy, FLATTEST_PX**2)
 
 
-def _steps(
-    z: np.ndarray, above: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale
-) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, columns) m, the step next to a cell, and one further away or behind a hole; 0 where there is none.
+@dataclass(frozen=True, eq=False)
+class _Steps:
+    """Steps about cells, (rows, columns) m, 0 where there is none.
 
-    A step is almost a pixel of parallax, from the lowest to the highest that any pair saw about a cell. The mean of the
-    cells around is taken off first, so that a slope is none. That mean holds a wall some cells away: no step is
-    therefore larger than the range of the heights themselves, next to a cell plus the slope over that distance. Further
-    away, within a window of the matching, steps count where few pairs agree on the height. Beside a hole, which may
-    hide the step, half a pixel counts, without that limit; where few pairs agree the range of heights over two windows,
-    less the slope, counts there, and for a cell that one pair alone saw holes are looked for as far.
+    Parameters
+    ----------
+    next_to : next to the cell.
+    far : within a window of the matching where few pairs agree on the height, or behind a hole.
+    between : distance of the height from the nearer of the lowest and the highest within a window, everywhere.
+    """
+
+    next_to: np.ndarray
+    far: np.ndarray
+    between: np.ndarray
+
+
+def _steps(z: np.ndarray, above: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -> _Steps:
+    """Steps about cells.
+
+    A step is almost a pixel of parallax, from the lowest to the highest that any pair saw within a window of the
+    matching. The mean of the cells around is taken off first, so that a slope is none. That mean holds a wall some
+    cells away: no step is therefore larger than the range of the heights themselves, next to a cell plus the slope.
+    A cell lies next to a step where a part of it is between its neighbours. Beside a hole, which may hide the step,
+    half a pixel counts; where few pairs agree the range of heights over two windows, less the slope, counts there, and
+    for a cell that one pair alone saw holes are looked for as far. Where several agree, no more than that half.
 
     Parameters
     ----------
@@ -138,20 +155,21 @@ def _steps(
     mean = sum_about(above, scale.around)
     mean = mean / np.maximum(sum_about(known.astype(np.float32), scale.around), 1.0) + middle
     left, whole = ((_less(seen.highest, level), _less(seen.lowest, level)) for level in (mean, middle))
+    few, slope = seen.agreeing < SEVERAL, _slope(above, known)
+    high, low = _about(*left, scale.window)
+    between = np.maximum(np.minimum(high - (z - mean), (z - mean) - low), 0.0)
+    within = np.minimum(high - low, _range(*whole, scale.window))
     side = 2 * ((scale.lag + 1) // 2) + 1
-    slope = _slope(above, known)
-    near = np.minimum(_range(*left, side), _range(*whole, side) + (side - 1) * slope)
-    in_window = _range(*left, scale.window)
-    few = seen.agreeing < SEVERAL
-    far = np.where(few, np.minimum(in_window, _range(*whole, scale.window)), 0.0)
+    next_to = np.minimum(_range(*left, side), _range(*whole, side) + (side - 1) * slope)
     over_two = _range(*whole, scale.around) - (scale.around - 1) * slope
-    hidden = np.where(few, np.maximum(in_window, over_two), in_window)
+    hidden = np.where(few, np.maximum(high - low, over_two), high - low)
     hidden[~_by_a_hole(known, seen, scale)] = 0.0
 
-    least = STEP_SIGMAS * noise
-    for step, smallest in ((near, LEAST_STEP_PX), (far, LEAST_STEP_PX), (hidden, LEAST_HIDDEN_PX)):
-        step[(step <= smallest * scale.pixel) | (step <= least)] = 0.0
-    return near, np.maximum(far, hidden)
+    for step, smallest in ((next_to, LEAST_NEXT_PX), (within, LEAST_STEP_PX), (hidden, LEAST_HIDDEN_PX)):
+        step[(step <= smallest * scale.pixel) | (step <= STEP_SIGMAS * noise)] = 0.0
+    next_to[within == 0.0] = 0.0
+    far = np.where(few, np.maximum(within, hidden), np.minimum(hidden, LEAST_HIDDEN_PX * scale.pixel))
+    return _Steps(next_to, far, between)
 
 
 def _by_a_hole(known: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
@@ -194,4 +212,10 @@ def _less(values: np.ndarray, level: np.ndarray | float) -> np.ndarray:
 
 def _range(high: np.ndarray, low: np.ndarray, side: int) -> np.ndarray:
     """(rows, columns) from the lowest to the highest of a square."""
-    return cv2.dilate(high, square(side)) - cv2.erode(low, square(side))
+    highest, lowest = _about(high, low, side)
+    return highest - lowest
+
+
+def _about(high: np.ndarray, low: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, columns) the highest and the lowest of a square."""
+    return cv2.dilate(high, square(side)), cv2.erode(low, square(side))
