@@ -1,7 +1,8 @@
-"""Rasters without georeference are opened without a warning, whatever other threads do."""
+"""Rasters without georeference are opened without a warning, whatever other threads do; all else is still told."""
 
 from __future__ import annotations
 
+import threading
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 
@@ -10,68 +11,111 @@ import pytest
 import rasterio
 from rasterio.errors import NotGeoreferencedWarning
 
-from aerotri import cli
+from aerotri.rasters.grids import Grid, RasterReader, write_raster
 from aerotri.rasters.images import create_image, open_photograph
-from aerotri.rasters.quiet import MESSAGE, quietly
+from aerotri.rasters.mosaics import read_heights, read_mosaic
+from aerotri.rasters.quiet import quietly
 
 
-def test_threads_that_overlap_leave_the_filters_as_they_were():
-    """The first that came in leaves first: the other one is still without warnings, and afterwards all is as before."""
-    with warnings.catch_warnings(record=True) as said:
+@pytest.fixture
+def photograph(tmp_path):
+    path = tmp_path / "photograph.tif"
+    with create_image(path, 40, 30, 1, "uint8") as writer:
+        writer.write(0, np.zeros((1, 30, 40), np.uint8))
+    return path
+
+
+@pytest.fixture
+def said():
+    with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
-        before = list(warnings.filters)
-        first, second = quietly(), quietly()
-        first.__enter__()
-        second.__enter__()
-        first.__exit__(None, None, None)
-        warnings.warn("no georeference", NotGeoreferencedWarning, stacklevel=1)
-        second.__exit__(None, None, None)
-        assert said == []
-        assert warnings.filters == before
-        warnings.warn("no georeference", NotGeoreferencedWarning, stacklevel=1)
-        assert len(said) == 1
+        yield found
 
 
-def test_an_error_inside_brings_the_filters_back():
+def georeference(said):
+    return [one for one in said if issubclass(one.category, NotGeoreferencedWarning)]
+
+
+def test_filters_stay_as_they_are(photograph):
     before = list(warnings.filters)
+    with quietly():
+        assert warnings.filters == before
+        with rasterio.open(photograph):
+            pass
     with pytest.raises(KeyError), quietly():
         raise KeyError
     assert warnings.filters == before
 
 
-def test_photographs_read_by_many_threads_warn_of_nothing(tmp_path):
-    path = tmp_path / "photograph.tif"
-    with create_image(path, 40, 30, 1, "uint8") as writer:
-        writer.write(0, np.zeros((1, 30, 40), np.uint8))
-
-    def read(_: int) -> int:
-        with open_photograph(path) as photograph:
-            return photograph.dataset.width
-
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        with ThreadPoolExecutor(8) as threads:
-            assert set(threads.map(read, range(200))) == {40}
-        assert said == []
-
-
-def test_filters_that_another_library_brings_back_do_not_make_the_program_warn(monkeypatch):
-    """One thread compiles with numba, which leaves its own `catch_warnings` while another one opens a photograph."""
-    monkeypatch.setattr(warnings, "formatwarning", warnings.formatwarning)
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        cli._warn_in_lines()
-        other = warnings.catch_warnings()
-        other.__enter__()
-        with quietly():
-            other.__exit__(None, None, None)
-            warnings.warn(f"{MESSAGE}, gcps, or rpcs.", NotGeoreferencedWarning, stacklevel=1)
-        assert said == []
-
-
-def test_the_message_is_that_of_rasterio(tmp_path):
-    path = tmp_path / "photograph.tif"
-    with create_image(path, 40, 30, 1, "uint8") as writer:
-        writer.write(0, np.zeros((1, 30, 40), np.uint8))
-    with pytest.warns(NotGeoreferencedWarning, match=f"^{MESSAGE}"), rasterio.open(path):
+def test_the_user_is_warned_of_what_he_opens_himself(photograph, said):
+    """Also while another thread is inside, and afterwards."""
+    with rasterio.open(photograph):
         pass
+    assert len(georeference(said)) == 1
+    with quietly(), ThreadPoolExecutor(1) as other:
+        with rasterio.open(photograph):
+            pass
+        assert len(georeference(said)) == 1
+        other.submit(lambda: rasterio.open(photograph).close()).result()
+        assert len(georeference(said)) == 2
+    with rasterio.open(photograph):
+        pass
+    assert len(georeference(said)) == 3
+    # where the user looks for it
+    assert georeference(said)[-1].filename == rasterio.__file__
+
+
+def test_other_warnings_of_rasterio_are_told(said):
+    with quietly():
+        rasterio._base.warnings.warn("another", UserWarning)
+        rasterio._base.warnings.warn("without georeference", NotGeoreferencedWarning, stacklevel=1)
+    assert [str(one.message) for one in said] == ["another"]
+    assert said[0].filename == __file__
+
+
+def test_left_in_another_thread_it_ends_all_the_same(photograph, said):
+    inside = quietly()
+    inside.__enter__()
+    with ThreadPoolExecutor(1) as other:
+        other.submit(inside.__exit__, None, None, None).result()
+    with rasterio.open(photograph):
+        pass
+    assert len(georeference(said)) == 1
+
+
+def test_filters_that_another_thread_brings_back_change_nothing(photograph, said):
+    """As numba does where it compiles: `catch_warnings` again and again beside threads that open photographs."""
+    ended = threading.Event()
+
+    def compiling():
+        while not ended.is_set():
+            with warnings.catch_warnings():
+                ended.wait(0.0005)
+
+    other = threading.Thread(target=compiling)
+    other.start()
+    try:
+        for _ in range(300):
+            with open_photograph(photograph):
+                pass
+    finally:
+        ended.set()
+        other.join()
+    assert georeference(said) == []
+
+
+def test_whatever_is_opened_or_written_warns_of_nothing(photograph, said, tmp_path):
+    grid = Grid(30, 40, 0.0, 30.0, 1.0, 1.0)
+    write_raster(tmp_path / "raster.tif", np.ones((30, 40)), grid, None, "Z, m")
+    with RasterReader(tmp_path / "raster.tif") as reader:
+        reader.read(0, 0, 30, 40)
+    read_mosaic(photograph)
+    read_heights(photograph, 20)
+    with ThreadPoolExecutor(8) as threads:
+
+        def read(_: int) -> int:
+            with open_photograph(photograph) as opened:
+                return opened.dataset.width
+
+        assert set(threads.map(read, range(200))) == {40}
+    assert georeference(said) == []

@@ -1,24 +1,24 @@
-"""Cut the pictures of the first steps from results: `python docs/figures/start.py DRONE_PROJECT DEFORMATION [ORTHO]`.
+"""Cut the pictures of the first steps from results: `python docs/figures/start.py DRONE_PROJECT DEFORMATION`.
 
-The folders are those that the pages "From a drone flight to a volume" and "A large-format block" make. ORTHO is that of
-`aerotri ortho --fill 4` of Brighton's photographs over their dense surface, for the picture of the README.
+The folders are those that the pages "From a drone flight to a volume" and "A large-format block" make.
 """
 
 from __future__ import annotations
 
+import io
 import sys
 from pathlib import Path
 
-import numpy as np
-import rasterio
+from matplotlib.figure import Figure
 from PIL import Image
+
+import aerotri
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "docs" / "start" / "figures"
 SITE = ROOT / "blocks" / "drone_site" / "photographs"
 WIDTH, GAP, COLOURS = 1400, 20, 200
-PARK, JPEG_WIDTH, SMALLER = (0.135, 0.95), 640, 7
-"""Share of the columns of Brighton's orthophoto that is shown, and pixels of the picture; cells of a pixel read."""
+DPI = 130
 
 
 def beside(*pictures: Image.Image, height: int) -> Image.Image:
@@ -44,6 +44,13 @@ def below(*pictures: Image.Image) -> Image.Image:
     return column
 
 
+def drawn(figure: Figure) -> Image.Image:
+    """A plot as a picture."""
+    content = io.BytesIO()
+    figure.savefig(content, dpi=DPI)
+    return Image.open(content)
+
+
 def save(picture: Image.Image, name: str, colours: int = COLOURS) -> None:
     """A picture of few colours, below 150 kB."""
     FOLDER.mkdir(parents=True, exist_ok=True)
@@ -54,28 +61,15 @@ def save(picture: Image.Image, name: str, colours: int = COLOURS) -> None:
     )
 
 
-def brighton(folder: Path) -> None:
-    """The orthophoto, white where there is none."""
-    with rasterio.open(folder / "ortho.tif") as file:
-        shape = file.count, file.height // SMALLER, file.width // SMALLER
-        bands = file.read(out_shape=shape, resampling=rasterio.enums.Resampling.average)
-    shown = np.where(bands[3] > 0, bands[:3], 255)[:, :, slice(*(round(share * shape[2]) for share in PARK))]
-    picture = Image.fromarray(shown.transpose(1, 2, 0).astype(np.uint8))
-    height = round(picture.height * JPEG_WIDTH / picture.width)
-    picture.resize((JPEG_WIDTH, height), Image.Resampling.LANCZOS).save(FOLDER / "brighton_ortho.jpg", quality=82)
-
-
-def main(project: Path, deformation: Path, ortho: Path | None = None) -> None:
+def main(project: Path, deformation: Path) -> None:
     """All pictures."""
     save(beside(*(Image.open(SITE / f"2_00{k}.jpg") for k in (1, 2, 3)), height=240), "drone_photographs", 24)
-    save(Image.open(project / "dtm" / "plots" / "surface.png"), "drone_surface")
+    save(drawn(aerotri.Surface(project / "dtm" / "dsm.tif", name="drone_site").plot()), "drone_surface")
     volume = project / "volume" / "plots"
     save(below(*(Image.open(volume / f"{name}.png") for name in ("thickness", "budget"))), "drone_volume")
-    save(Image.open(project / "ortho" / "plots" / "orthophoto.png"), "drone_ortho")
+    save(Image.open(project / "ortho" / "plots" / "orthophoto.png"), "drone_ortho", 14)
     save(Image.open(deformation / "plots" / "contours.png"), "deformation")
-    if ortho is not None:
-        brighton(ortho)
 
 
 if __name__ == "__main__":
-    main(*(Path(word) for word in sys.argv[1:4]))
+    main(*(Path(word) for word in sys.argv[1:3]))

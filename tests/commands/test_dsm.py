@@ -2,10 +2,12 @@
 
 import inspect
 import json
+import re
 
 import laspy
 import numpy as np
 import pytest
+import shapely
 from typer.testing import CliRunner
 
 import aerotri
@@ -13,8 +15,11 @@ from aerotri import cli
 from aerotri.cli import app
 from aerotri.conventions import InputError
 from aerotri.formats.results.point_cloud import read_point_cloud
+from aerotri.public.results import open_result
+from aerotri.public.terrain import rows_and_files
 from aerotri.rasters.grids import RasterReader
 from aerotri.terrain.dense import measure
+from aerotri.terrain.photographs import photographs_of
 
 PLAN = """
 name = "tiny"
@@ -63,9 +68,45 @@ def test_files_hold_the_same_surface(made):
     assert np.median(sigma[known]) == pytest.approx(content["sigma_Z_m"]["median"], rel=1e-3)
     xyz, _ = read_point_cloud(here / "dsm" / "dsm.laz")
     np.testing.assert_allclose(np.sort(xyz[:, 2]), np.sort(z[known]), atol=6e-4)
-    assert (here / "dsm" / "plots" / "surface.png").is_file()
-    assert (here / "dsm" / "plots" / "colours.png").is_file()
+    assert {path.stem for path in (here / "dsm" / "plots").glob("*.png")} == {
+        "surface", "colours", "sigma", "photographs"
+    }  # fmt: skip
     assert not (here / "dsm.tiles").exists()
+
+
+def test_the_page_has_the_pictures_and_names_the_files(made):
+    here, content = made
+    page = (here / "dsm" / "dsm.html").read_text(encoding="utf-8")
+    assert page.count("<figure") == 4
+    written = {path.name for path in (here / "dsm").iterdir()} - {".aerotri-files"}
+    assert set(re.findall(r"<td><code>([^<]+)</code></td>", page)) == written
+    held = content["adjusted"]
+    assert (held["verdict"], held["check_points"], held["rms_check_m"]["Z"]) == ("accepted", 0, None)
+    assert held["control_points"] > 0
+    assert "There are no check points" in page
+    assert page.index("no check points") < page.index("<figure")
+
+
+def test_coverage_is_of_what_pairs_of_photographs_show(made):
+    """Of three photographs in a row: what two neighbours have in common; the ground is nearly level."""
+    here, content = made
+    record = open_result(here / "result").record
+    photographs = photographs_of(record, *rows_and_files(record, [here / "block" / "photographs"], np.arange(3)))
+    one, two, three = (box_of(photographs, k) for k in range(3))
+    shown = shapely.union(shapely.intersection(one, two), shapely.intersection(two, three)).area
+    assert content["shown_area_m2"] == pytest.approx(shown, rel=0.03)
+    assert content["coverage"] == pytest.approx(content["area_m2"] / content["shown_area_m2"])
+    assert 0.9 < content["coverage"] <= 1.0
+
+
+def box_of(photographs, k):
+    """The usable part of a photograph on the mean height of the ground."""
+    half = 0.98 * photographs.sensor[k, :2] / photographs.sensor[k, 2]
+    c, x0, y0 = photographs.orientation.interior[k]
+    corners = [(sx * half[0] - x0, sy * half[1] - y0, -c) for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    rays = np.array(corners) @ photographs.orientation.rotation[k].T
+    centre = photographs.centres[k]
+    return shapely.Polygon(centre[:2] + rays[:, :2] * ((photographs.ground - centre[2]) / rays[:, 2:]))
 
 
 def test_the_cloud_has_colours_normals_and_covariances(made):
@@ -167,7 +208,8 @@ def test_files_are_the_same_wherever_tiles_are_measured(made, tmp_path, monkeypa
         printed = run(*given, "--out", out, "--executor", text)
         assert ("Dask dashboard: " in printed) == text.startswith("dask")
         found[text] = {path.relative_to(out): path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    assert len(found["threads"]) == 10
+    # record, page, three rasters, cloud, four plots as PNG and SVG, and what the folder holds
+    assert len(found["threads"]) == 15
     assert found["processes:2"] == found["threads"]
     assert found["dask:local:2"] == found["threads"]
 

@@ -6,6 +6,7 @@ import importlib
 import inspect
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -65,9 +66,15 @@ def test_files(made):
         assert one.kind == "MultiLineString"
         assert {one.properties["photograph_1"], one.properties["photograph_2"]} <= names
     assert all(isinstance(figure, Figure) for figure in found.plot.all().values())
+    assert {path.stem for path in (here / "out" / "plots").glob("*.png")} == {"orthophoto", "sigma", "seams", "points"}
     assert (here / "out" / "plots" / "points.png").stat().st_size > 10_000
+    page = (here / "out" / "ortho.html").read_text(encoding="utf-8")
+    assert page.count("<figure") == 4
+    assert set(re.findall(r"<td><code>([^<]+)</code></td>", page)) == {
+        path.name for path in (here / "out").iterdir()
+    } - {".aerotri-files"}
     assert "cells of 2 m" in repr(found)
-    marks = found.plot.orthophoto().axes[0].collections[1:]
+    marks = found.plot.orthophoto().axes[0].collections
     drawn = np.concatenate([np.asarray(one.get_offsets()) for one in marks])
     assert sorted(map(tuple, drawn.tolist())) == sorted((p["X"], p["Y"]) for p in found.summary["points"])
 

@@ -108,7 +108,7 @@ def test_the_folder(tmp_path):
     assert content["volumes"][0]["net_m3"] == pytest.approx(found.volumes["net_m3"][0])
     page = (out / "change.html").read_text()
     assert "±" in page
-    assert page.count("<img") == 1
+    assert page.count("<img") == 2
     assert {path.name for path in out.iterdir()} == {"change.json", "change.tif", "change.csv", "change.html", "plots",
                                                      ".aerotri-files"}  # fmt: skip
 

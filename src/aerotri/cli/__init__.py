@@ -36,7 +36,6 @@ from aerotri.cli import (
 from aerotri.cli.app import app
 from aerotri.conventions import InputError
 from aerotri.execution.work import NO_SPACE, TasksFailedError
-from aerotri.rasters.quiet import never_told
 
 __all__ = [
     "adjusting", "app", "blocks", "change", "converting", "explaining", "exporting", "image_errors", "main", "ortho",
@@ -82,7 +81,6 @@ def _speak_any_encoding() -> None:
 
 def _warn_in_lines() -> None:
     warnings.formatwarning = _as_line
-    never_told()
 
 
 def _as_line(

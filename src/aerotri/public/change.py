@@ -17,6 +17,7 @@ from aerotri.public.argument_types import with_checked_types
 from aerotri.public.change_areas import notes_of_areas, refuse_unknown_areas, with_whole_areas
 from aerotri.public.change_doubts import doubts_of_stable_ground
 from aerotri.public.change_epochs import (
+    brought_to_metres,
     common_system,
     doubts_of,
     epoch_of,
@@ -58,14 +59,20 @@ class ChangePlots:
     areas: tuple[Boundary, ...]
 
     def difference(self) -> Figure:
-        """Map of what changed beyond the level of detection, and of σ."""
+        """Map of what changed beyond the level of detection."""
         from aerotri.report.plots.change import plot_change
 
         return plot_change(self.record, self.summary, self.areas)
 
+    def difference_sigma(self) -> Figure:
+        """Map of the σ of the difference."""
+        from aerotri.report.plots.change import plot_change_sigma
+
+        return plot_change_sigma(self.record, self.summary, self.areas)
+
     def all(self) -> dict[str, Figure]:
         """Every plot of the page by the name of its file."""
-        return {"difference": self.difference()}
+        return {"difference": self.difference(), "difference_sigma": self.difference_sigma()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -170,7 +177,8 @@ def change(
     ----------
     first : the earlier surface: GeoTIFF with σ as second band (its description begins with σ), folder of `dsm` or
         `dtm`, or what these returned; or a folder of `run`, whose dense surface (else its terrain) and adjustment are
-        taken.
+        taken. A GeoTIFF in degrees or feet is brought to metres: to the system of the other one where that is in
+        metres, else to the UTM zone of the first.
     second : the later surface.
     stable : ground that did not change: GeoPackage, GeoJSON or WKT file, WKT text, or a shapely polygon. The second
         surface is aligned on it, and it tells the noise.
@@ -217,13 +225,13 @@ def change(
     if noise_length is not None and not 0.0 <= noise_length < 1e6:
         raise InputError(f"a noise length of {noise_length:g} m is not possible", "give metres")
     with ExitStack() as stack:
-        epochs = epochs_of((first, second), (first_adjustment, second_adjustment))
+        epochs, brought = brought_to_metres(epochs_of((first, second), (first_adjustment, second_adjustment)))
         crs, of_heights = common_system(epochs)
         epsg = plan_code(crs)
         grid = grid_of(epochs)
         same = epochs[0].key != "" and epochs[0].key == epochs[1].key
         (before, of_before), (after, of_after) = (epoch_of(one, grid, stack, noise_length, same) for one in epochs)
-        notes = [of_heights] if of_heights else []
+        notes = [*brought, *([of_heights] if of_heights else [])]
         notes += [text for text in (of_before, of_after) if text and stable is None]
         ground = None if stable is None else _boundary_of(stable, epsg)
         areas = _areas(area, grid, epsg)
@@ -335,6 +343,7 @@ def _write(target: Path, found: MeasuredChange, plots: bool) -> None:
             from aerotri.report.pages.change import write_change_page
             from aerotri.report.plots.rendering import save_plots
 
-            save_translated("difference", found.plot.difference, folder / "plots")
+            for name in ("difference", "difference_sigma"):
+                save_translated(name, getattr(found.plot, name), folder / "plots")
             write_change_page(found.summary, save_plots(found.plot.all(), folder / "plots"), folder / PAGE, found.head)
         write_json(folder / RECORD, found.summary)

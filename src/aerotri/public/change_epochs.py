@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -165,6 +166,28 @@ def common_system(epochs: Epochs) -> tuple[str, str]:
             refuse_stretched(reader)
             codes.append(reader.crs_code)
     return system_of_both(codes, names_of(epochs))
+
+
+def brought_to_metres(epochs: Epochs) -> tuple[Epochs, list[str]]:
+    """Both in one system that counts in metres, where files count in degrees or feet; and what was done, in sentences.
+
+    Raises
+    ------
+    InputError
+        For heights in memory that are not in metres.
+    """
+    from aerotri.rasters.metric import MetricReader, metric_target
+
+    with ExitStack() as stack:
+        target = metric_target([stack.enter_context(one.surface.reader()) for one in epochs])
+    found: list[MeasuredSurface] = []
+    said: list[str] = []
+    for one in epochs:
+        with one.surface.reader(target) as reader:
+            brought, note = isinstance(reader, MetricReader) and reader.is_brought, getattr(reader, "note", "")
+        found.append(replace(one, given=replace(one.surface, target=target)) if brought else one)
+        said += [note] if note else []
+    return (found[0], found[1]), list(dict.fromkeys(said))
 
 
 def system_of_both(codes: Sequence[str], labels: Sequence[str]) -> tuple[str, str]:

@@ -48,10 +48,16 @@ class CloudChangePlots:
     summary: dict[str, Any]
 
     def distances(self) -> Figure:
-        """Map of the distances beyond the level of detection, and of σ."""
+        """Map of the distances beyond the level of detection."""
         from aerotri.report.plots.cloud_change import plot_distances
 
         return plot_distances(self.record, self.summary)
+
+    def distances_sigma(self) -> Figure:
+        """Map of the σ of the distances."""
+        from aerotri.report.plots.cloud_change import plot_distances_sigma
+
+        return plot_distances_sigma(self.record, self.summary)
 
     def histogram(self) -> Figure:
         """Histogram of the distances, those beyond the level of detection apart."""
@@ -61,7 +67,9 @@ class CloudChangePlots:
 
     def all(self) -> dict[str, Figure]:
         """Every plot by the name of its file."""
-        return {"distances": self.distances(), "histogram": self.histogram()}
+        return {
+            "distances": self.distances(), "distances_sigma": self.distances_sigma(), "histogram": self.histogram()
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -133,8 +141,8 @@ class MeasuredCloudChange:
                 from aerotri.report.pages.cloud_change import write_cloud_change_page
                 from aerotri.report.plots.rendering import save_plots
 
-                for name, draw in (("distances", self.plot.distances), ("histogram", self.plot.histogram)):
-                    save_translated(name, draw, folder / "plots")
+                for name in ("distances", "distances_sigma", "histogram"):
+                    save_translated(name, getattr(self.plot, name), folder / "plots")
                 drawn = save_plots(self.plot.all(), folder / "plots")
                 write_cloud_change_page(self.summary, drawn, folder / PAGE, self.head)
             write_json(folder / RECORD, self.summary)

@@ -16,6 +16,7 @@ from aerotri.execution.choice import THREADS, chosen
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.dense_plots import DensePlots
+from aerotri.public.described import files_in
 from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.missing_photographs import missing_in_words, missing_photographs
 from aerotri.public.progress import ProgressLike, stage_report
@@ -33,8 +34,10 @@ if TYPE_CHECKING:
     from aerotri.terrain.dense.measure import DenseOutcome
 
 RECORD, SURFACE, MATCHING, COUNT, CLOUD = "dsm.json", "dsm.tif", "matching.tif", "photographs.tif", "dsm.laz"
-GROUND, SOURCE = "dtm.tif", "ground.tif"
-OWN_NAMES = (RECORD, SURFACE, MATCHING, COUNT, CLOUD, GROUND, SOURCE, "plots")
+GROUND, SOURCE, PAGE = "dtm.tif", "ground.tif", "dsm.html"
+PLACE = "folder of dsm"
+"""Of the files, as the reference calls it."""
+OWN_NAMES = (RECORD, SURFACE, MATCHING, COUNT, CLOUD, GROUND, SOURCE, "plots", PAGE)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,6 +53,7 @@ class DenseSurface:
     head : of files. settings : every argument that was used, as dsm.json has them.
     missing : photographs of the block that were not given.
     notes : on the input and on what σ lacks, in sentences.
+    adjusted : verdict and check points of the adjustment, as dsm.json has them.
     """
 
     record: DenseOutcome
@@ -62,6 +66,7 @@ class DenseSurface:
     settings: list[dict[str, Any]] = field(default_factory=list)
     missing: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    adjusted: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
     def surface(self) -> Surface:
@@ -105,22 +110,22 @@ class DenseSurface:
         found = dense_json(self.record, self.block, self.crs, self.ground)
         return self.head.as_dict() | found | {
             "photographs_missing": list(self.missing), "adjustment": self.adjustment, "settings": self.settings,
-            "notes": list(self.notes),
+            "notes": list(self.notes), "adjusted": self.adjusted,
         }  # fmt: skip
 
     @property
     def plot(self) -> DensePlots:
         """Plots of the surface, each a matplotlib Figure."""
-        return DensePlots(self.record, self.block)
+        return DensePlots(self.record, self.block, self.summary["sigma_Z_m"])
 
     def save(self, out: FilePath, plots: bool = True) -> Path:
-        """Write dsm.tif, matching.tif, photographs.tif, dsm.laz, dsm.json and the plots into a folder.
+        """Write dsm.tif, matching.tif, photographs.tif, dsm.laz, dsm.json, the plots and the page into a folder.
 
         Where the ground was filtered, dtm.tif and ground.tif besides.
 
         Parameters
         ----------
-        out : folder; an older result there is replaced in one step. plots : draw the surface.
+        out : folder; an older result there is replaced in one step. plots : draw the plots and the page.
 
         Returns
         -------
@@ -233,6 +238,7 @@ def _measured(
 ) -> DenseSurface:  # fmt: skip
     from aerotri.execution.opening import opened
     from aerotri.formats.files.spool import Spool
+    from aerotri.formats.results.adjusted import adjusted_json
     from aerotri.statistics.camera_field import missing_in_sigma
     from aerotri.terrain.dense.bare_ground import bare_ground
     from aerotri.terrain.dense.measure import DensePlan, measure_surface
@@ -262,7 +268,10 @@ def _measured(
     lacks = missing_in_sigma(record)
     notes = (*missing_in_words(missing, photographs), *((lacks,) if lacks else ()))
     head = Head(block.project, block.crs)
-    return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper, head, used, missing, notes)
+    return DenseSurface(
+        outcome, str(block.name), block.crs, key, ground, keeper, head, used, missing, notes,
+        adjusted_json(record.result),
+    )  # fmt: skip
 
 
 def _surface_parts(o: DenseOutcome) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
@@ -314,7 +323,10 @@ def _write(target: Path, dense: DenseSurface, plots: bool) -> None:
             what = "ground: 1 measured, 2 bridged"
             write_raster_parts(folder / SOURCE, source, o.grid, crs, what, np.dtype(np.uint8), 0.0)
         if plots:
+            from aerotri.report.pages.dense import dense_parts
+            from aerotri.report.pages.product import write_product_page
             from aerotri.report.plots.rendering import save_plots
 
-            save_plots(dense.plot.all(), folder / "plots")
+            drawn, said = save_plots(dense.plot.all(), folder / "plots"), dense.summary
+            write_product_page(dense_parts(said), said, drawn, files_in(PLACE, folder), folder / PAGE, dense.head)
         write_json(folder / RECORD, dense.summary)

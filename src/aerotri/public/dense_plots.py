@@ -1,8 +1,10 @@
-"""Plots of a dense surface: its shape, the σ of its heights, and its colours."""
+"""Plots of a dense surface: its shape, its colours, the σ of its heights, and how many photographs measured it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from aerotri.rasters.grids import Grid
+    from aerotri.report.plots.dense import DrawnSurface
     from aerotri.terrain.dense.measure import DenseOutcome
     from aerotri.terrain.dense.tile_files import TileWindow
 
@@ -24,26 +27,30 @@ class DensePlots:
 
     Parameters
     ----------
-    record : what was measured. block : name of the block.
+    record : what was measured. block : name of the block. medians : m, of σ, as sigma_Z_m of dsm.json has them.
     """
 
     record: DenseOutcome
     block: str
+    medians: Mapping[str, float]
 
     def surface(self) -> Figure:
-        """The surface, lit from the north-west as far as it was measured, and the σ of its heights."""
-        from aerotri.report.plots.terrain import plot_dense
+        """The surface, lit from the north-west as far as it was measured."""
+        from aerotri.report.plots.dense import plot_dense
 
-        o, drawn = self.record, self._drawn
-        z, matching, total = (np.full((drawn.rows, drawn.columns), np.nan) for _ in range(3))
-        for window, tile in o.files.read_all(list(o.windows)):
-            grid = o.grid.window(window.row, window.column, window.rows, window.columns)
-            taken, place = self._place(window)
-            sigma = np.hypot(tile.sigma, o.shared.over(grid))
-            for whole, part in ((z, tile.z), (matching, tile.sigma), (total, sigma)):
-                whole[place] = part[taken]
-        is_local = o.photographs.places.frame is None
-        return plot_dense(drawn, z, total, float(np.nanmedian(matching)), self.block, is_local)
+        return plot_dense(self._layers)
+
+    def sigma(self) -> Figure:
+        """The σ of the heights, of matching and adjustment together."""
+        from aerotri.report.plots.dense import plot_dense_sigma
+
+        return plot_dense_sigma(self._layers, self.medians)
+
+    def photographs(self) -> Figure:
+        """How many photographs measured a cell."""
+        from aerotri.report.plots.dense import plot_photographs
+
+        return plot_photographs(self._layers)
 
     def colours(self) -> Figure:
         """The measured cells in the colours of the photographs.
@@ -53,7 +60,7 @@ class DensePlots:
         InputError
             When a photograph cannot be read any more.
         """
-        from aerotri.report.plots.colours import plot_colours
+        from aerotri.report.plots.dense import plot_colours
         from aerotri.terrain.dense.colours import Colours
 
         o, drawn = self.record, self._drawn
@@ -70,6 +77,22 @@ class DensePlots:
             shown[place][i, j] = colours.of(xyz, tile.shown_by[taken][i, j])
             known[place] = np.isfinite(z)
         return plot_colours(drawn, shown, known, self.block, o.photographs.places.frame is None)
+
+    @cached_property
+    def _layers(self) -> DrawnSurface:
+        """The cells that are drawn."""
+        from aerotri.report.plots.dense import DrawnSurface
+
+        o, drawn = self.record, self._drawn
+        z, total, count = (np.full((drawn.rows, drawn.columns), np.nan) for _ in range(3))
+        for window, tile in o.files.read_all(list(o.windows)):
+            grid = o.grid.window(window.row, window.column, window.rows, window.columns)
+            taken, place = self._place(window)
+            sigma = np.hypot(tile.sigma, o.shared.over(grid))
+            for whole, part in ((z, tile.z), (total, sigma), (count, tile.count)):
+                whole[place] = part[taken]
+        is_local = o.photographs.places.frame is None
+        return DrawnSurface(drawn, z, total, np.nan_to_num(count).astype(np.int16), o.grid.cell_x, self.block, is_local)
 
     @property
     def _step(self) -> int:
@@ -93,4 +116,7 @@ class DensePlots:
 
     def all(self) -> dict[str, Figure]:
         """Every plot by the name of its file."""
-        return {"surface": self.surface(), "colours": self.colours()}
+        return {
+            "surface": self.surface(), "colours": self.colours(), "sigma": self.sigma(),
+            "photographs": self.photographs(),
+        }  # fmt: skip

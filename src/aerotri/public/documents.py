@@ -31,7 +31,7 @@ KINDS = {MeasuredVolume: VOLUME, MeasuredChange: CHANGE, MeasuredCloudChange: CL
 """Results that have a certificate, and the file that says so in a folder."""
 NEEDED = {VOLUME: "dtm", CHANGE: "volumes", CLOUD_CHANGE: "core_points"}
 """What such a file cannot be without."""
-PICTURES = ("thickness", "budget", "difference", "distances", "histogram")
+PICTURES = ("thickness", "budget", "difference", "difference_sigma", "distances", "distances_sigma", "histogram")
 
 
 @dataclass(frozen=True)

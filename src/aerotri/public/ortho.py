@@ -16,9 +16,11 @@ from aerotri.execution.choice import THREADS, chosen
 from aerotri.execution.opening import opened
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.argument_types import with_checked_types
+from aerotri.public.described import files_in
 from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.ground_of_block import off_the_ground
 from aerotri.public.missing_photographs import missing_in_words, missing_photographs
+from aerotri.public.ortho_plots import OrthoPlots
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
 from aerotri.public.terrain import ENDINGS
@@ -30,58 +32,19 @@ from aerotri.terrain.ortho.settings import DEFAULTS, OrthoSettings, Sampling
 from aerotri.volume.settings import LAYERS, Layer
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from aerotri.public.surfaces import SurfaceLike
     from aerotri.results.adjustment import Adjustment as Record
     from aerotri.terrain.ortho.accuracy import HeightSigma
     from aerotri.terrain.ortho.make import OrthoOutcome
 
-RECORD, SEAMS = "ortho.json", "seams.gpkg"
-OWN_NAMES = (RECORD, SEAMS, "ortho.tif", "photographs.tif", "sigma.tif", "plots")
+RECORD, SEAMS, PAGE = "ortho.json", "seams.gpkg", "ortho.html"
+PLACE = "folder of ortho"
+"""Of the files, as the reference calls it."""
+OWN_NAMES = (RECORD, SEAMS, "ortho.tif", "photographs.tif", "sigma.tif", "plots", PAGE)
 MOST_NAMED = 5
 """Photographs that a note names."""
 LAYER: Layer = "dsm"
 """Of a folder of `aerotri dtm`: with roofs and trees, so that they stand where they are."""
-
-
-@dataclass(frozen=True, eq=False)
-class OrthoPlots:
-    """Plots of an orthophoto, each a matplotlib Figure.
-
-    Parameters
-    ----------
-    record : the numbers as arrays. folder : with the rasters. points : control and check points. block : its name.
-    """
-
-    record: OrthoOutcome
-    folder: Path
-    points: tuple[Any, ...]
-    block: str
-
-    def orthophoto(self) -> Figure:
-        """The orthophoto with its seams and points, and σ of its positions."""
-        from aerotri.report.plots.ortho import plot_orthophoto
-
-        return plot_orthophoto(self.record, self.folder, self.block, self.points)
-
-    def points_in_it(self) -> Figure:
-        """The ground around control and check points, with a cross where their coordinates are.
-
-        Raises
-        ------
-        InputError
-            When none lies in the orthophoto.
-        """
-        from aerotri.report.plots.ortho import plot_points
-
-        if not self.points:
-            raise InputError("no control or check point lies in the orthophoto", "leave this plot out")
-        return plot_points(self.record, self.folder, self.points, self.block)
-
-    def all(self) -> dict[str, Figure]:
-        """Every plot by the name of its file."""
-        return {"orthophoto": self.orthophoto()} | ({"points": self.points_in_it()} if self.points else {})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -165,7 +128,7 @@ def orthophoto(
     ideal : the photographs are those of `aerotri.ideal_photographs`, free of image errors.
     fill : m, holes of the surface that are at most so wide are bridged for the picture; σ is not known there.
     layer : surface of a terrain model: with objects (dsm) or without (dtm).
-    plots : draw the orthophoto and the points in it.
+    plots : draw the plots and the page.
     tiles : folder for the tiles of the orthophoto; a run that was ended goes on with those it finds there. None: they
         are not kept. No other run may write there meanwhile.
     executor : where the tiles are made: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'.
@@ -247,29 +210,39 @@ def _made(
         notes += (*_blurred(made.blur, taken[1]), *((lacks,) if lacks else ()))
         notes += missing_in_words(missing, photographs)
         said = {"photographs_missing": list(missing), "notes": list(notes)}
-        outcome, summary, points = _described(record, made, ground.label, settings, folder, said)
+        head = Head(record.result.block.project, record.result.block.crs)
+        outcome, summary, points = _described(record, made, ground.label, settings, folder, head.as_dict(), said)
         if plots:
-            from aerotri.report.plots.rendering import save_plots
-
             report.stage("drawing", None)
-            drawn = OrthoPlots(outcome, folder, points, str(record.result.block.name))
-            save_plots(drawn.all(), folder / "plots")
+            _draw(OrthoPlots(outcome, folder, points, str(record.result.block.name)), summary, folder, head)
     return Orthophoto(out, summary, outcome, points, notes)
 
 
+def _draw(plots: OrthoPlots, summary: dict[str, Any], folder: Path, head: Head) -> None:
+    """Write the plots and the page."""
+    from aerotri.report.pages.ortho import ortho_parts
+    from aerotri.report.pages.product import write_product_page
+    from aerotri.report.plots.rendering import save_plots
+
+    drawn = save_plots(plots.all(), folder / "plots")
+    write_product_page(ortho_parts(summary), summary, drawn, files_in(PLACE, folder), folder / PAGE, head)
+
+
 def _described(
-    record: Record, outcome: OrthoOutcome, name: str, settings: OrthoSettings, folder: Path, said: dict[str, Any]
-) -> tuple[OrthoOutcome, dict[str, Any], tuple[Any, ...]]:
-    """Write seams and record beside the image; said : what else the record has."""
+    record: Record, outcome: OrthoOutcome, name: str, settings: OrthoSettings, folder: Path, head: dict[str, Any],
+    said: dict[str, Any],
+) -> tuple[OrthoOutcome, dict[str, Any], tuple[Any, ...]]:  # fmt: skip
+    """Write seams and record beside the image; head, said : what the record begins with, and what else it has."""
+    from aerotri.formats.results.adjusted import adjusted_json
     from aerotri.formats.results.json_text import write_json
     from aerotri.formats.results.ortho import marked_points, ortho_json, write_seams
     from aerotri.rasters.grids import horizontal_crs
 
     block = record.result.block
     write_seams(folder / SEAMS, outcome, horizontal_crs(block.crs))
-    summary = Head(block.project, block.crs).as_dict() | ortho_json(outcome, block, name, settings.resampling)
+    summary = head | ortho_json(outcome, block, name, settings.resampling)
     summary["settings"] = used_settings(orthophoto, settings, {"cell": "m", "area": "m"})
-    summary |= said
+    summary |= said | {"adjusted": adjusted_json(record.result)}
     write_json(folder / RECORD, summary)
     return outcome, summary, tuple(marked_points(outcome, block))
 

@@ -228,9 +228,12 @@ def is_usable(result: Adjustment) -> bool:
 def write_report(content: Mapping[str, Any], folder: Path, head: Head) -> None:
     """The record and the page, each whole or not at all."""
     from aerotri.formats.files.atomic import atomic_file
-    from aerotri.report.pages.run import run_page
+    from aerotri.public.described import files_in
+    from aerotri.report.pages.run import PRODUCTS, run_page
+
+    files = {name: files_in(f"folder of {name}", folder / name) for name in PRODUCTS}
 
     with atomic_file(folder / RECORD) as place:
         write_json(place, content)
     with atomic_file(folder / REPORT) as place:
-        place.write_text(run_page(dict(content), folder, head), encoding="utf-8")
+        place.write_text(run_page(dict(content), folder, head, files), encoding="utf-8")

@@ -60,6 +60,7 @@ class Surface:
     crs : of heights in memory, 'EPSG:25832', None for local coordinates; a file says it itself.
     name : as it stands in results; that of the file where empty.
     keeper : what removes the file when nobody uses it any more, None for a file that stays.
+    target : 'EPSG:n' that a file in degrees or feet is brought to; its UTM zone where None.
 
     Examples
     --------
@@ -73,6 +74,7 @@ class Surface:
     crs: str | None = None
     name: str = ""
     keeper: Spool | None = None
+    target: str | None = None
 
     @classmethod
     def of_array(
@@ -130,7 +132,7 @@ class Surface:
         InputError
             When the file cannot be read, or does not fit into memory.
         """
-        return self.source if isinstance(self.source, Heights) else _read_whole(Path(self.source))
+        return self.source if isinstance(self.source, Heights) else _read_whole(Path(self.source), self.target)
 
     @property
     def grid(self) -> Grid:
@@ -152,19 +154,23 @@ class Surface:
 
         Parameters
         ----------
-        target : 'EPSG:n' that a file in degrees or feet is brought to; its UTM zone without.
+        target : 'EPSG:n' that a file in degrees or feet is brought to; that of the surface, or its UTM zone, without.
 
         Raises
         ------
         InputError
-            When the file is no raster of heights.
+            When the file is no raster of heights, or heights in memory are in degrees or feet.
         """
         if isinstance(self.source, Heights):
+            from aerotri.rasters.metric import refuse_plan_not_in_metres
+
+            if self.crs:
+                refuse_plan_not_in_metres(self.crs, self.label)
             h = self.source
             return HeldRaster(np.where(_is_written(h), h.z, np.nan), h.grid, self.crs, self.label)
         from aerotri.rasters.metric import MetricReader
 
-        return MetricReader(self.source, target=target)
+        return MetricReader(self.source, target=target or self.target)
 
     def plot(self) -> Figure:
         """The surface lit from the north-west, and its σ where it is known."""
@@ -295,11 +301,11 @@ def _is_written(heights: Heights) -> np.ndarray:
     return known if known.any() else np.ones(known.shape, bool)
 
 
-def _read_whole(path: Path) -> Heights:
+def _read_whole(path: Path, target: str | None) -> Heights:
     from aerotri.memory import refuse_beyond_memory
     from aerotri.rasters.metric import MetricReader
 
-    with MetricReader(path) as reader:
+    with MetricReader(path, target=target) as reader:
         g = reader.grid
         refuse_beyond_memory(
             float(BYTES_OF_CELL) * g.rows * g.columns, f"{path.name} with {g.rows} × {g.columns} cells",
@@ -308,5 +314,5 @@ def _read_whole(path: Path) -> Heights:
         z, bands = reader.read(0, 0, g.rows, g.columns).astype(float), reader.bands
     if bands < 2:
         return Heights(g, z, np.full_like(z, np.nan))
-    with MetricReader(path, band=2) as reader:
+    with MetricReader(path, band=2, target=target) as reader:
         return Heights(g, z, reader.read(0, 0, g.rows, g.columns).astype(float))

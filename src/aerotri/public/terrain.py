@@ -54,10 +54,16 @@ class TerrainPlots:
     block: str
 
     def surface(self) -> Figure:
-        """The surface with objects, lit from the north-west, and the σ of its cells."""
+        """The surface with objects, lit from the north-west."""
         from aerotri.report.plots.terrain import plot_surface
 
         return plot_surface(self.record, self.block)
+
+    def sigma(self) -> Figure:
+        """The σ of its cells."""
+        from aerotri.report.plots.terrain import plot_surface_sigma
+
+        return plot_surface_sigma(self.record, self.block)
 
     def pickets(self) -> Figure:
         """Where pickets are: accepted, moved to a place nearby, in error, and the nodes that stayed holes."""
@@ -67,7 +73,7 @@ class TerrainPlots:
 
     def all(self) -> dict[str, Figure]:
         """Every plot by the name of its file."""
-        return {"surface": self.surface(), "pickets": self.pickets()}
+        return {"surface": self.surface(), "sigma": self.sigma(), "pickets": self.pickets()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

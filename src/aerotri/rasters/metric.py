@@ -7,6 +7,7 @@ say it, they have to agree.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -99,6 +100,11 @@ class MetricReader(RasterReader):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return MetricReader, (self.path.absolute(), self.band, self._target)
+
+    @property
+    def is_brought(self) -> bool:
+        """Whether its plan was brought to another system."""
+        return self._source is not None
 
     @property
     def crs_code(self) -> str:
@@ -232,6 +238,39 @@ def refuse_other_units(reader: RasterReader) -> None:
         f"is in {units.crs}, which counts in {units.plan}",
         f"bring it to metres first: gdalwarp -r bilinear -t_srs {target} IN OUT", reader.path,
     )  # fmt: skip
+
+
+def refuse_plan_not_in_metres(crs: str, name: str) -> None:
+    """Refuse heights in memory whose CRS, 'EPSG:n', does not count in metres: their cells are taken for metres.
+
+    Raises
+    ------
+    InputError
+    """
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError
+
+    try:
+        whole = CRS.from_user_input(crs)
+    except CRSError:
+        return
+    flat = whole.sub_crs_list[0] if whole.is_compound else whole
+    axis = flat.axis_info[0] if flat.axis_info else None
+    if axis is not None and UNITS.get(axis.unit_name) != METRE:
+        raise InputError(
+            f"{name} is in {crs} ({flat.name}), which counts in {axis.unit_name}",
+            "save it as a GeoTIFF and give the file, which is brought to metres; or bring it to metres before",
+        )
+
+
+def metric_target(readers: Sequence[MetricReader | HeldRaster]) -> str | None:
+    """'EPSG:n' that several rasters can be brought to, the first of theirs in metres; None where none states one.
+
+    Where no file has been in metres, the system that the first of them was brought to.
+    """
+    plans = [(reader, reader.crs_code.partition("+")[0]) for reader in readers]
+    own = [plan for reader, plan in plans if plan and not (isinstance(reader, MetricReader) and reader.is_brought)]
+    return next(iter(own or [plan for _, plan in plans if plan]), None)
 
 
 def refuse_stretched(reader: RasterReader | HeldRaster) -> None:

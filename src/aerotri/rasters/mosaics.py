@@ -123,7 +123,7 @@ def read_heights(path: Path, longest: int) -> np.ndarray:
     """
     import rasterio
 
-    with rasterio.open(path) as file:
+    with quietly(), rasterio.open(path) as file:
         less = max(1.0, max(file.height, file.width) / longest)
         shape = max(int(file.height / less), 1), max(int(file.width / less), 1)
         return file.read(1, out_shape=shape, masked=True).astype(float).filled(np.nan)

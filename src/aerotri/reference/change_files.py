@@ -159,6 +159,8 @@ def change_files() -> tuple[DescribedFile, ...]:
             CLOUD_TABLE,
             when="of point clouds",
         ),
-        DescribedFile("plots", CHANGE, "folder", "Map of the change and σ; histogram of distances.", when=plots),
+        DescribedFile(
+            "plots", CHANGE, "folder", "Maps of the change and of its σ; histogram of distances.", when=plots
+        ),
         DescribedFile("change.html", CHANGE, "page", "The change on one page.", when=plots),
     )

@@ -26,6 +26,19 @@ HEAD_BESIDE_CRS = (
 )
 HEAD = (*HEAD_BESIDE_CRS, CRS)
 """What the JSON file of every result begins with."""
+ADJUSTED = (
+    Item("adjusted", "object", "The adjustment that photographs were oriented by."),
+    Item(
+        "adjusted.verdict", "text", "Its verdict.",
+        values={"accepted": "", "doubtful": "", "rejected": ""},
+    ),
+    Item("adjusted.reason", "text", "The first reason for the verdict; empty where it is accepted."),
+    Item("adjusted.control_points", "whole", "Its control points."),
+    Item("adjusted.check_points", "whole", "Its check points."),
+    Item("adjusted.rms_check_m", "object", "RMS of the differences at its check points.", "m"),
+    *(Item(f"adjusted.rms_check_m.{axis}", "number?", f"RMS in {axis}; null without.", "m") for axis in "XYZ"),
+)  # fmt: skip
+"""What surfaces and orthophotos say of the adjustment they were made with."""
 ORIGINS = {"given": "stated, or chosen by the program", "default": "the default value, stated or not"}
 ARGUMENTS = (
     Item(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.head import ARGUMENTS, BLOCK, HEAD
+from aerotri.reference.head import ADJUSTED, ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.records import DescribedFile, Item, within
 
 ORTHO = "folder of ortho"
@@ -83,6 +83,7 @@ ORTHO_JSON = (
     Item("photographs[].area_m2", "number", "Area taken from it.", "m²"),
     Item("photographs[].gain[]", "number", "Factor of its colours, by band."),
     Item("photographs[].offset[]", "number", "Added to its colours, by band, share of white."),
+    *ADJUSTED,
     Item("notes[]", "text", "What was done with the input, and what σ lacks, in sentences."),
     *ARGUMENTS,
 )
@@ -110,7 +111,8 @@ def ortho_files() -> tuple[DescribedFile, ...]:
             "between two of them.",
         ),
         DescribedFile(
-            "plots", ORTHO, "folder", "Orthophoto with seams and σ, and the points in it, PNG and SVG.",
+            "plots", ORTHO, "folder", "Orthophoto, its σ, its seams, and the points in it, PNG and SVG.",
             when="unless --no-plots",
         ),
+        DescribedFile("ortho.html", ORTHO, "page", "The orthophoto on one page.", when="unless --no-plots"),
     )  # fmt: skip

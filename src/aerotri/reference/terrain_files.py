@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.head import ARGUMENTS, BLOCK, HEAD
+from aerotri.reference.head import ADJUSTED, ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.image_error_files import MODELS
 from aerotri.reference.records import DescribedFile, Item, of_axes
 from aerotri.terrain.picket_status import TEXTS, PicketStatus
@@ -79,6 +79,8 @@ DSM_JSON = (
     Item("cells.all", "whole", "Of the whole raster."),
     Item("cells.measured", "whole", "That have a height."),
     Item("area_m2", "number", "Area of the cells that have a height.", "m²"),
+    Item("shown_area_m2", "number", "Ground that pairs of photographs show under an angle that can be matched.", "m²"),
+    Item("coverage", "number", "Share of that ground that has heights, 0 to 1."),
     Item("pairs", "whole", "Pairs of photographs that were matched."),
     Item("tiles", "whole", "Pieces the surface was measured in."),
     Item("tiles_resumed", "whole", "Pieces that an earlier run, which was ended, had measured."),
@@ -116,6 +118,7 @@ DSM_JSON = (
     Item("ground.bridge.power", "number", "Power by which it grows with the distance."),
     Item("ground.bridge.discs", "whole", "Discs of ground that were taken out, bridged and compared to find it."),
     Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
+    *ADJUSTED,
     Item("notes[]", "text", "What was done with the input, and what σ lacks, in sentences."),
     *ARGUMENTS,
 )
@@ -390,7 +393,7 @@ def terrain_files() -> tuple[DescribedFile, ...]:
         ),
         DescribedFile("model.tif", DTM, "raster", "Number of the pair of photographs of every cell.", when=pairs),
         DescribedFile("models.csv", DTM, "table", "The pairs by their numbers.", MODELS, pairs),
-        DescribedFile("plots", DTM, "folder", "Surface and points, PNG and SVG.", when=plots),
+        DescribedFile("plots", DTM, "folder", "Surface, its σ and points, PNG and SVG.", when=plots),
         DescribedFile("dsm.json", DSM, "json", "Cells of the surface and how sure they are.", DSM_JSON),
         DescribedFile("dsm.tif", DSM, "raster", "The whole surface: band 1 height, band 2 its standard deviation, m."),
         DescribedFile("matching.tif", DSM, "raster", "Standard deviation of the heights from matching alone, m."),
@@ -418,8 +421,13 @@ def terrain_files() -> tuple[DescribedFile, ...]:
             "cov_xy, cov_xz, cov_yz, m², sigma_z_matching and photographs. Class 2 is ground.",
         ),
         DescribedFile(
-            "plots", DSM, "folder", "The surface, its standard deviation and its colours, PNG and SVG.", when=plots
+            "plots",
+            DSM,
+            "folder",
+            "The surface, its colours, its standard deviation and the number of photographs, PNG and SVG.",
+            when=plots,
         ),
+        DescribedFile("dsm.html", DSM, "page", "The surface on one page.", when=plots),
         DescribedFile("compare.json", COMPARE, "json", "Statistics of the differences of two surfaces.", COMPARE_JSON),
         DescribedFile("difference.tif", COMPARE, "raster", "Differences test − control, m."),
         DescribedFile("plots", COMPARE, "folder", "Map and histogram, PNG and SVG.", when=plots),

@@ -54,7 +54,7 @@ def figures_of_surfaces():
     z[10:20, 10:20] += 1.5
     one, two = (aerotri.Surface.of_array(values, **flat) for values in (np.full((40, 40), 100.0), z))
     volume = aerotri.volume(two, base=99.0).plot.thickness()
-    return {"thickness": volume, "change": aerotri.change(one, two, align="none").plot.difference()}, set()
+    return {"thickness": volume} | aerotri.change(one, two, align="none").plot.all(), set()
 
 
 def figures_of_clouds():

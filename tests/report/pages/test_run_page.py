@@ -9,12 +9,24 @@ from aerotri.results.head import Head
 
 
 def test_numbers_of_a_step_have_words_and_units(tmp_path):
-    (tmp_path / "ortho").mkdir()
-    numbers = {"gsd_m": 0.02, "sigma_m": {"total": {"q95": 0.5}}, "area_m2": {"surface": 7}, "bands": 3}
-    (tmp_path / "ortho" / "ortho.json").write_text(json.dumps(numbers), encoding="utf-8")
-    step = {"name": "other", "folder": "ortho", "what": "Orthophoto", "status": "done", "reason": "", "seconds": 1.0,
-            "arguments": ["ortho"]}  # fmt: skip
+    (tmp_path / "dtm").mkdir()
+    numbers = {"gsd_m": 0.02, "sigma_Z_m": {"matching": 0.5}, "ray_sigma_px": 0.1, "photographs": 3}
+    (tmp_path / "dtm" / "dtm.json").write_text(json.dumps(numbers), encoding="utf-8")
+    step = {"name": "dtm", "folder": "dtm", "what": "Terrain", "status": "done", "reason": "", "seconds": 1.0,
+            "arguments": ["dtm"]}  # fmt: skip
     page = run_page({"source": "photographs", "steps": [step], "seconds": 1.0}, tmp_path, Head())
-    for words in ("GSD [m]", "σ of positions [m]: total: 95 % below", "area [m²]: surface", "bands"):
+    for words in ("GSD [m]", "σ of heights [m]: matching", "σ of a matched image coordinate [px]", "photographs"):
         assert f"<th>{words}</th>" in page
     assert "<th>gsd m</th>" not in page
+
+
+def test_plots_of_a_step_come_in_their_order_with_what_they_show(tmp_path):
+    (tmp_path / "dtm" / "plots").mkdir(parents=True)
+    for name in ("another_one", "pickets", "sigma", "surface"):
+        (tmp_path / "dtm" / "plots" / f"{name}.png").write_bytes(name.encode())
+    step = {"name": "dtm", "folder": "dtm", "what": "Terrain", "status": "done", "reason": "", "seconds": 1.0,
+            "arguments": ["dtm"]}  # fmt: skip
+    page = run_page({"source": "photographs", "steps": [step], "seconds": 1.0}, tmp_path, Head())
+    places = [page.index(text) for text in ("Terrain with objects, lit", "σ of the heights", "Ground points (pickets)",
+                                            "another one")]  # fmt: skip
+    assert places == sorted(places)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.terrain.dense.bare_ground import BRIDGED, MEASURED, BareGround
+from aerotri.terrain.dense.coverage import shown_area
 from aerotri.terrain.dense.lasting import LASTING_PX, lasting_errors
 from aerotri.terrain.dense.measure import DenseOutcome
 from aerotri.version import __version__
@@ -19,11 +20,12 @@ def dense_json(outcome: DenseOutcome, block: str, crs: str, ground: BareGround |
     noise = o.shared_cells * o.grid.cell_x if np.isfinite(o.shared_cells) else None
     gsd = float(np.median(o.photographs.gsd))
     lasting, length = lasting_errors(o.pixel, gsd * 2**o.level)
+    area, shown = o.cells * o.grid.cell_x * o.grid.cell_y, shown_area(o)
     return {
         "aerotri": __version__, "block": block, "crs": crs, "photographs": len(o.photographs),
         "gsd_m": gsd, "cell_m": o.grid.cell_x,
         "cells": {"all": o.grid.rows * o.grid.columns, "measured": o.cells},
-        "area_m2": o.cells * o.grid.cell_x * o.grid.cell_y,
+        "area_m2": area, "shown_area_m2": shown, "coverage": area / shown,
         "pairs": len(np.unique(np.sort(o.pairs, axis=1), axis=0)), "tiles": len(o.windows), "tiles_resumed": o.resumed,
         "photographs_mean": float(count.mean()),
         "sigma_Z_m": {
@@ -52,9 +54,10 @@ def _ground(ground: BareGround) -> dict[str, Any]:
 def _samples(o: DenseOutcome) -> list[tuple[np.ndarray, ...]]:
     """σ, that of matching, that of the adjustment, and photographs, of some of the cells that have a height."""
     found = []
+    # one step for all tiles: else those with few cells would count more than others
+    every = max(-(-o.cells // MOST_SAMPLES), 1)
     for window, tile in o.files.read_all(list(o.windows)):
         row, column = np.nonzero(np.isfinite(tile.z))
-        every = max(-(-len(row) * len(o.windows) // MOST_SAMPLES), 1)
         # copies: a view of every so many cells would keep all of them
         row, column = row[::every].copy(), column[::every].copy()
         if len(row):

@@ -14,7 +14,7 @@ from aerotri.report.documents.volume import two
 from aerotri.report.documents.words import Words, breakable
 from aerotri.report.plots.rendering import RenderedPlot
 
-PICTURES = ("distances", "histogram")
+PICTURES = ("distances", "distances_sigma", "histogram")
 
 
 def cloud_change_certificate(

@@ -9,14 +9,16 @@ from typing import Any
 from aerotri.formats.results.change import at_most
 from aerotri.report.pages.adjustment import data_address
 from aerotri.report.pages.head import page_environment, page_head, settings_rows
+from aerotri.report.pages.product import sentence
 from aerotri.report.plots.rendering import RenderedPlot
 from aerotri.report.quality import printable, two_digits, with_sigma
 from aerotri.results.head import Head
 
-CAPTION = (
-    "Left: difference of the surfaces where it is beyond the level of detection; brown is gained, blue (hatched) is "
-    "lost, grey cannot be told from noise. Right: σ of the difference."
-)
+CAPTIONS = {
+    "difference": "Difference of the surfaces where it is beyond the level of detection; brown is gained, blue "
+    "(hatched) is lost, grey cannot be told from noise.",
+    "difference_sigma": "σ of the difference. Dark is less sure.",
+}
 NOTHING = "no cell is beyond the level of detection"
 PARTS = {
     "adjustment": "adjustments", "model": "image errors that photographs share",
@@ -33,9 +35,10 @@ def write_change_page(content: Mapping[str, Any], plots: Mapping[str, RenderedPl
     environment = page_environment()
     text = environment.get_template("change.html.j2").render(
         first=printable(content["first"]), second=printable(content["second"]),
-        cards=_cards(content["volumes"][-1]), warnings=[printable(text, 1000) for text in content["warnings"]],
+        cards=_cards(content["volumes"][-1]), warnings=[sentence(text) for text in content["warnings"]],
         sure=_sure(content), rows=[_row(one) for one in content["volumes"]], unknowns=_unknowns(content),
-        alignment=_alignment(content), plots=[data_address(plot) for plot in plots.values()], caption=CAPTION,
+        alignment=_alignment(content),
+        plots=[(CAPTIONS[name], data_address(plot), name) for name, plot in plots.items()],
         head=page_head(head, of_block=False), settings=settings_rows(content),
     )  # fmt: skip
     path.write_text(text, encoding="utf-8")

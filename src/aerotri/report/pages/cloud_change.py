@@ -8,14 +8,16 @@ from typing import Any
 
 from aerotri.report.pages.adjustment import data_address
 from aerotri.report.pages.head import page_environment, page_head, settings_rows
+from aerotri.report.pages.product import sentence
 from aerotri.report.plots.rendering import RenderedPlot
 from aerotri.report.quality import printable, two_digits
 from aerotri.results.head import Head
 
 CAPTIONS = {
-    "distances": "Left: distance of the second cloud from the first, along the normal of the ground, where it is "
-    "beyond the level of detection; brown is gained (the second lies above), blue (hatched) is lost, grey "
-    "cannot be told from noise. Right: σ of the distance.",
+    "distances": "Distance of the second cloud from the first, along the normal of the ground, where it is beyond the "
+    "level of detection; brown is gained (the second lies above), blue (hatched) is lost, grey cannot be told from "
+    "noise.",
+    "distances_sigma": "σ of the distance. Dark is less sure.",
     "histogram": "Number of places by their distance. The scale of counts is logarithmic, so that few places are seen "
     "beside many. Each place is held against its own level of detection; the broken lines are the median of all.",
 }
@@ -34,9 +36,9 @@ def write_cloud_change_page(
     """Write the page; content of cloud_change.json, plots by the names of `CAPTIONS`."""
     text = page_environment().get_template("cloud_change.html.j2").render(
         first=printable(content["first"]), second=printable(content["second"]), cards=_cards(content),
-        warnings=[printable(text, 1000) for text in content["warnings"]], sure=_sure(content), stable=_stable(content),
+        warnings=[sentence(text) for text in content["warnings"]], sure=_sure(content), stable=_stable(content),
         rows=_rows(content), head=page_head(head, of_block=False), settings=settings_rows(content),
-        plots=[(data_address(plot), CAPTIONS[name]) for name, plot in plots.items()],
+        plots=[(CAPTIONS[name], data_address(plot), name) for name, plot in plots.items()],
     )  # fmt: skip
     path.write_text(text, encoding="utf-8")
 

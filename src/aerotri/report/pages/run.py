@@ -5,14 +5,17 @@ from __future__ import annotations
 import base64
 import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from aerotri.conventions import counted
+from aerotri.report.pages.dense import dense_parts
 from aerotri.report.pages.head import page_environment, page_head
+from aerotri.report.pages.ortho import ortho_parts
+from aerotri.report.pages.product import FileText, ProductParts
 from aerotri.report.pages.volume import tonnes
 from aerotri.report.quality import printable, two_digits
 from aerotri.results.head import Head
@@ -21,46 +24,57 @@ RESULT = "result"
 """Folder of the adjustment."""
 LARGEST_PLOTS = 12
 """Plots of a step that has no report of its own."""
-IN_PARTS = ("cells", "sigma_Z_m", "sigma_m", "area_m2")
-"""Figures of surfaces and orthophotos that consist of several."""
+IN_PARTS = ("sigma_Z_m",)
+"""Figures that consist of several."""
 UNITS = {"m": "m", "m2": "m²", "m3": "m³", "px": "px", "um": "µm", "mm": "mm", "percent": "%"}
 WORDS = {"sigma": "σ", "q90": "90 % below", "q95": "95 % below", "gsd": "GSD", "crs": "CRS", "max": "largest"}
 """Of keys, as the page writes them."""
 LABELS = {
     "crs": "coordinate system, code", "crs_name": "coordinate system", "height_system": "system of heights",
-    "photographs_mean": "photographs of a cell, mean", "tiles": "pieces it was measured in",
     "ray_sigma_px": "σ of a matched image coordinate [px]",
     "sigma0_rays": "σ0 of the intersection of rays (1: as stated)",
     "interval_m": "distance of the points [m]", "interval_source": "distance of the points from",
     "ground_share": "share of the points that are ground", "ground_within": "all is ground within",
-    "of_one_adjustment": "surface of the same adjustment", "pixel_type": "type of the values",
-    "noise_length_m": "noise length of the matching [m]", "control": "control points", "check": "check points",
-    "sigma_Z_m": "σ of heights [m]", "sigma_m": "σ of positions [m]",
+    "control": "control points", "check": "check points", "sigma_Z_m": "σ of heights [m]",
 }  # fmt: skip
 """Of keys whose words alone do not say what they are."""
-TECHNICAL = ("aerotri", "computed", "adjustment", "tiles_resumed", "marking_page")
+TECHNICAL = ("aerotri", "computed", "adjustment", "marking_page")
 """Keys that are for programs."""
 PICTURES = (
     ("ortho", "orthophoto.png", "Orthophoto"),
-    ("dsm", "surface.png", "Dense surface: heights and their σ"),
+    ("dsm", "surface.png", "Dense surface"),
     ("dsm", "colours.png", "Dense surface in the colours of the photographs"),
     ("volume", "thickness.png", "Volume: height over the base"),
 )
 """What the page begins with: step, plot and caption."""
+CAPTIONS = {
+    "dtm": {
+        "surface": "Terrain with objects, lit from the north-west, with contours.",
+        "sigma": "σ of the heights. Dark is less sure.",
+        "pickets": "Ground points (pickets): accepted, moved nearby, rejected; circles: holes.",
+    }
+}
+"""Of the plots of steps that have no page of their own."""
+PRODUCTS: Mapping[str, Callable[[Mapping[str, Any]], ProductParts]] = {"dsm": dense_parts, "ortho": ortho_parts}
+"""Steps whose own pages consist of parts that stand on this one as well."""
 
 
-def run_page(content: dict[str, Any], folder: Path, head: Head) -> str:
+def run_page(
+    content: dict[str, Any], folder: Path, head: Head, files: Mapping[str, Sequence[FileText]] | None = None
+) -> str:
     """The page as text; it loads nothing from elsewhere, and what the steps' pages hold cannot run scripts.
 
     Parameters
     ----------
     content : source, steps (name, folder, what, status, reason, seconds, arguments), seconds.
-    folder : where the steps wrote. head : of the page.
+    folder : where the steps wrote. head : of the page. files : that steps wrote, by their names.
     """
     environment = page_environment()
     done = {step["name"]: folder / step["folder"] for step in content["steps"] if step["status"] == "done"}
     shown = _pictures(done)
     steps = [_step(step, folder / step["folder"], set(shown)) for step in content["steps"]]
+    for step in steps:
+        step["files"] = (files or {}).get(step["name"], ())
     template = environment.get_template("run.html.j2")
     adjusted = _read(folder / RESULT / "adjustment.json")
     return template.render(
@@ -71,14 +85,15 @@ def run_page(content: dict[str, Any], folder: Path, head: Head) -> str:
     )  # fmt: skip
 
 
-def _pictures(done: Mapping[str, Path]) -> dict[Path, tuple[str, str]]:
-    """Caption and content of the plots that the page begins with, by their files."""
+def _pictures(done: Mapping[str, Path]) -> dict[Path, tuple[str, str, str]]:
+    """Caption, content and name of the plots that the page begins with, by their files."""
     places = [(done[name] / "plots" / plot, caption) for name, plot, caption in PICTURES if name in done]
-    return {place: (caption, _encoded(place)) for place, caption in places if place.is_file()}
+    return {place: (caption, _address(place), place.stem) for place, caption in places if place.is_file()}
 
 
-def _encoded(path: Path) -> str:
-    return base64.b64encode(path.read_bytes()).decode("ascii")
+def _address(path: Path) -> str:
+    """A picture inside the page, as a data address."""
+    return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -147,18 +162,33 @@ def _step(step: dict[str, Any], folder: Path, shown: set[Path]) -> dict[str, Any
     places = (folder / name for name in ("report.html", "accuracy.html", "volume.html"))
     pages = [place for place in places if done and place.is_file()]
     page = pages[0].read_text(encoding="utf-8") if pages else ""
-    there = sorted((folder / "plots").glob("*.png")) if done and not page else []
+    parts = _parts_of(step["name"], folder) if done else None
+    captions = parts.captions if parts else CAPTIONS.get(step["name"], {})
+    there = _in_order(folder / "plots", list(captions)) if done and not page else []
     plots = [plot for plot in there if plot not in shown][:LARGEST_PLOTS]
     return {
         **step,
         "reason": printable(step["reason"], 1000),
         "command": printable(shlex.join(("aerotri", *step["arguments"])), 1000),
-        "figures": _figures(folder) if done else [],
+        "parts": parts,
+        "figures": _figures(folder) if done and not parts else [],
         "page": page,
         "file": f"{step['folder']}/{pages[0].name}" if pages else "",
-        "plots": [(plot.stem.replace("_", " "), _encoded(plot)) for plot in plots],
+        "plots": [(captions.get(one.stem, one.stem.replace("_", " ")), _address(one), one.stem) for one in plots],
         "marking": done and (folder / "control_marks" / "marking.html").is_file(),
     }
+
+
+def _parts_of(name: str, folder: Path) -> ProductParts | None:
+    """What the own page of a step says, without its pictures; None for steps that have none of this kind."""
+    content = _read(folder / f"{name}.json") if name in PRODUCTS else {}
+    return PRODUCTS[name](content) if content else None
+
+
+def _in_order(folder: Path, names: list[str]) -> list[Path]:
+    """The plots of a step, those that are named first, in their order."""
+    there = sorted(folder.glob("*.png"))
+    return sorted(there, key=lambda one: names.index(one.stem) if one.stem in names else len(names))
 
 
 def _figures(folder: Path) -> list[tuple[str, str]]:

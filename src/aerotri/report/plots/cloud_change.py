@@ -1,4 +1,4 @@
-"""Distances of two clouds: map of those beyond the level of detection beside σ, and their histogram."""
+"""Distances of two clouds: maps of those beyond the level of detection and of σ, and their histogram."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, StrMethodFormatter
 
 from aerotri.report.plots.canvas import INK, WIDTH, axes_at, new_figure, plain, styled, value_text
-from aerotri.report.plots.change import HATCH, finish_map, hatch_lost
+from aerotri.report.plots.change import HATCH, hatch_lost
+from aerotri.report.plots.maps import Bounds, extent_of, key_below, scale_beside, single_map
 from aerotri.report.plots.volume import COLOURS
+from aerotri.report.quality import two_digits
 from aerotri.volume.change.clouds import CloudDistances
 
-HIGHEST, QUIET, BINS = 4.6, "#d8d8d8", 60
+QUIET, BINS = "#d8d8d8", 60
 SHARE = 0.5
 """Of the places of a square, those lost at least where it is hatched; chosen [C]."""
 GAINED, LOST, SAME = "gained", "lost", "within the level of detection"
@@ -26,13 +28,7 @@ GAINED, LOST, SAME = "gained", "lost", "within the level of detection"
 
 @styled
 def plot_distances(found: CloudDistances, content: Mapping[str, Any]) -> Figure:
-    """Two maps side by side on one scale of coordinates, a mark a core point."""
-    low, high = found.core[:, :2].min(axis=0), found.core[:, :2].max(axis=0)
-    margin = 0.02 * max(float((high - low).max()), 1e-6)
-    (left, bottom), (right, top) = low - margin, high + margin
-    ratio = float(np.clip((right - left) / (top - bottom), 0.2, 5.0))
-    width = min((WIDTH - 3.6) / 2.0, HIGHEST * ratio)
-    height = width / ratio
+    """Map of the distances beyond the level of detection, a mark a core point."""
     known = np.isfinite(found.distance)
     beyond = np.abs(found.distance) > found.level(content["registration_m"])
     subtitle = (
@@ -40,31 +36,55 @@ def plot_distances(found: CloudDistances, content: Mapping[str, Any]) -> Figure:
         f"grey: within the level of detection (95 %); {content['beyond_level_percent']:.1f} % of the places are "
         "beyond it"
     )
-    figure = new_figure(height + 2.1, "Distances of two point clouds", subtitle)
-    size = max((72.0**2 * width * height / max(len(found.core), 1)) * 1.3, 0.5)
-    largest = float(np.percentile(np.abs(found.distance[beyond if beyond.any() else known]), 99.0))
-    most = float(np.percentile(found.sigma[known], 99.0))
-    maps: tuple[tuple[np.ndarray, np.ndarray, dict[str, Any], str], ...] = (
-        (beyond, found.distance, {"cmap": COLOURS, "norm": TwoSlopeNorm(0.0, -max(largest, 1e-6), max(largest, 1e-6))},
-         "distance [m]"),
-        (known, found.sigma, {"cmap": "Greys", "vmin": 0.0, "vmax": max(1.6 * most, 1e-9)}, "σ [m]"),
+    bounds = _bounds(found)
+    figure, axes = single_map("Distances of two point clouds", subtitle, bounds, not content["crs"], key=True)
+    size = _size_of_marks(figure, axes, len(found.core))
+    largest = max(float(np.percentile(np.abs(found.distance[beyond if beyond.any() else known]), 99.0)), 1e-6)
+    axes.scatter(*found.core[known & ~beyond, :2].T, s=size, c=QUIET, marker="s", lw=0)
+    image = axes.scatter(
+        *found.core[beyond, :2].T, s=size, c=found.distance[beyond], marker="s", lw=0, cmap=COLOURS,
+        norm=TwoSlopeNorm(0.0, -largest, largest),
     )  # fmt: skip
-    for k, (rows, values, style, label) in enumerate(maps):
-        x0 = 0.95 + k * (width + 1.6)
-        axes = axes_at(figure, x0, 1.1, width, height)
-        if k == 0:
-            axes.scatter(*found.core[known & ~beyond, :2].T, s=size, c=QUIET, marker="s", lw=0)
-        image = axes.scatter(*found.core[rows, :2].T, s=size, c=values[rows], marker="s", lw=0, **style)
-        if k == 0:
-            _hatch_lost(axes, found, beyond, (left, right, bottom, top), content["spacing_m"])
-        finish_map(figure, axes, image, label, (left, bottom, right, top), k == 0, content["crs"])
+    _hatch_lost(axes, found, beyond, extent_of(bounds), content["spacing_m"])
+    scale_beside(figure, axes, image, "distance [m]")
     handles = [
         Patch(facecolor=COLOURS(0.85), label=GAINED),
         Patch(facecolor=COLOURS(0.15), edgecolor="white", hatch=HATCH, lw=0.0, label=LOST),
         Patch(facecolor=QUIET, label=SAME),
     ]
-    figure.legend(handles=handles, loc="center left", bbox_to_anchor=(0.9 / WIDTH, 0.25 / (height + 2.1)), ncols=3)
+    key_below(figure, handles)
     return figure
+
+
+@styled
+def plot_distances_sigma(found: CloudDistances, content: Mapping[str, Any]) -> Figure:
+    """Map of the σ of the distances."""
+    known = np.isfinite(found.distance)
+    most = max(float(np.percentile(found.sigma[known], 99.0)), 1e-9)
+    subtitle = f"median {two_digits(content['sigma_m'])} m"
+    figure, axes = single_map("σ of the distances", subtitle, _bounds(found), not content["crs"])
+    size = _size_of_marks(figure, axes, len(found.core))
+    image = axes.scatter(
+        *found.core[known, :2].T, s=size, c=found.sigma[known], marker="s", lw=0, cmap="Greys", vmin=0.0,
+        vmax=1.2 * most,
+    )  # fmt: skip
+    scale_beside(figure, axes, image, "σ [m]")
+    return figure
+
+
+def _bounds(found: CloudDistances) -> Bounds:
+    """Around all places; not narrower than a fifth of their length: a wall is a line on a map."""
+    low, high = found.core[:, :2].min(axis=0), found.core[:, :2].max(axis=0)
+    longest = max(float((high - low).max()), 1e-6)
+    middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low) + 0.02 * longest, 0.1 * longest)
+    (left, bottom), (right, top) = middle - half, middle + half
+    return float(left), float(bottom), float(right), float(top)
+
+
+def _size_of_marks(figure: Figure, axes: Axes, count: int) -> float:
+    """Points², so that marks spread evenly over the map nearly cover it."""
+    box, inches = axes.get_position(), figure.get_size_inches()
+    return max(72.0**2 * box.width * box.height * float(inches.prod()) / max(count, 1) * 1.3, 0.5)
 
 
 def _hatch_lost(

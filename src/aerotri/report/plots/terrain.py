@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 from scipy.ndimage import gaussian_filter
 
@@ -26,13 +27,12 @@ from aerotri.report.plots.canvas import (
     styled,
     value_text,
 )
+from aerotri.report.plots.maps import HIGHEST, coordinate_names, extent_of, scale_beside, single_map
 from aerotri.report.quality import two_digits
 from aerotri.terrain.compare import Comparison
 from aerotri.terrain.dtm import TerrainOutcome
 from aerotri.terrain.picket_status import PicketStatus
 
-HIGHEST = 6.4
-"""Inches that a map is high at most: with its title it fits a printed page."""
 HOLE = "#cfe0f2"
 MOST_CELLS = 1200
 """Cells drawn along a side, the others skipped; chosen [C]: about the pixels of the picture."""
@@ -41,8 +41,6 @@ SHADE_CELLS = 1.0
 CONTOUR_CELLS, CONTOUR_SMOOTHED = 300, 4.0
 """Cells along a side from which on contours are drawn through some of them, smoothed, and σ of that, in cells that are
 drawn; chosen [C]: on level ground a contour through noise is a cloud of dots."""
-OUTLYING = 0.002
-"""Share of the measured cells at each side of a picture that may lie beyond it [C]: a few far cells would shrink it."""
 ERROR_MARKS = {
     PicketStatus.BACKWARD: ("x", "backward"), PicketStatus.AMBIGUOUS: ("+", "ambiguous"),
     PicketStatus.NEIGHBOURS: ("s", "off its neighbours"), PicketStatus.PEAK: ("^", "peak or pit"),
@@ -50,19 +48,56 @@ ERROR_MARKS = {
 
 
 def plot_surface(outcome: TerrainOutcome, block_name: str) -> Figure:
-    """The surface with objects, lit from the north-west, and the σ of its cells."""
+    """The surface with objects, lit from the north-west."""
     o = outcome
-    z = o.dsm.z
     subtitle = (
         f"{len(o.pickets.names)} photographs, pickets every {length_text(float(f'{o.interval:.3g}'))}, cells of "
-        f"{length_text(float(f'{o.cell:.3g}'))}; heights {np.nanmin(z):.1f} … {np.nanmax(z):.1f} m\n"
-        f"σ of the heights: median {two_digits(float(np.nanmedian(o.dsm.sigma)))} m; white: no pickets"
+        f"{length_text(float(f'{o.cell:.3g}'))}; {_heights_in_words(o.dsm.z)}; white: no pickets"
     )
-    return _plot_heights(o.dsm.grid, z, o.dsm.sigma, block_name, subtitle, o.photographs.places.frame is None)
+    return plot_shape(o.dsm.grid, o.dsm.z, f"Surface – {plain(block_name)}", subtitle, _is_local(o))
 
 
+def plot_surface_sigma(outcome: TerrainOutcome, block_name: str) -> Figure:
+    """The σ of the cells of the surface."""
+    o = outcome
+    subtitle = f"median {two_digits(float(np.nanmedian(o.dsm.sigma)))} m; white: no pickets"
+    return plot_grey(
+        o.dsm.grid, o.dsm.sigma, (f"σ of the heights – {plain(block_name)}", subtitle, "σ of Z [m]"), _is_local(o)
+    )
+
+
+def _is_local(outcome: TerrainOutcome) -> bool:
+    return outcome.photographs.places.frame is None
+
+
+def _heights_in_words(z: np.ndarray) -> str:
+    return f"heights {np.nanmin(z):.1f} … {np.nanmax(z):.1f} m".replace("-", "−")
+
+
+@styled
+def plot_shape(grid: Grid, z: np.ndarray, title: str, subtitle: str, is_local: bool) -> Figure:
+    """Heights (rows, columns) m, lit from the north-west, as a map of a column's width."""
+    figure, axes = single_map(title, subtitle, grid.bounds, is_local)
+    _draw_shape(axes, grid, z)
+    return figure
+
+
+@styled
+def plot_grey(grid: Grid, values: np.ndarray, texts: tuple[str, str, str], is_local: bool) -> Figure:
+    """Values (rows, columns) as grey tones, as a map of a column's width.
+
+    Parameters
+    ----------
+    texts : title, what stands below it, and label of the scale.
+    """
+    figure, axes = single_map(texts[0], texts[1], grid.bounds, is_local)
+    scale_beside(figure, axes, _draw_grey(axes, grid, values), texts[2])
+    return figure
+
+
+@styled
 def plot_heights(grid: Grid, z: np.ndarray, sigma: np.ndarray | None, name: str, is_local: bool) -> Figure:
-    """A surface lit from the north-west, and the σ of its cells where it is known.
+    """A surface lit from the north-west, and beside it the σ of its cells where it is known.
 
     Parameters
     ----------
@@ -70,48 +105,25 @@ def plot_heights(grid: Grid, z: np.ndarray, sigma: np.ndarray | None, name: str,
     """
     known = f"; σ: median {two_digits(float(np.nanmedian(sigma)))} m" if sigma is not None else ""
     subtitle = (
-        f"{grid.rows} × {grid.columns} cells of {length_text(float(f'{grid.cell_x:.3g}'))}; heights "
-        f"{np.nanmin(z):.1f} … {np.nanmax(z):.1f} m{known}; white: not known"
+        f"{grid.rows} × {grid.columns} cells of {length_text(float(f'{grid.cell_x:.3g}'))}; {_heights_in_words(z)}"
+        f"{known}; white: not known"
     )
-    return _plot_heights(grid, z, sigma, name, subtitle, is_local)
-
-
-def plot_dense(grid: Grid, z: np.ndarray, sigma: np.ndarray, matching: float, name: str, is_local: bool) -> Figure:
-    """A dense surface as far as it was measured, and the σ of its heights.
-
-    Parameters
-    ----------
-    z, sigma : (rows, columns) m, NaN where not measured; σ of matching and adjustment together.
-    matching : m, median σ of matching alone.
-    """
-    known = np.isfinite(z)
-    rows, columns = (between(known.sum(axis=axis)) for axis in (1, 0))
-    part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    z, sigma = z[part], sigma[part]
-    subtitle = (
-        f"cells of {length_text(float(f'{grid.cell_x:.3g}'))}; heights {np.nanmin(z):.1f} … {np.nanmax(z):.1f} m; "
-        f"white: not measured\nσ of heights, drawn: median {two_digits(float(np.nanmedian(sigma)))} m; of matching "
-        f"alone {two_digits(matching)} m"
-    )
-    shown = grid.window(int(rows[0]), int(columns[0]), *z.shape)
-    return _plot_heights(shown, z, sigma, name, subtitle, is_local)
-
-
-def between(counts: np.ndarray) -> tuple[int, int]:
-    """First and last row, or column, between which nearly all measured cells lie."""
-    share = np.cumsum(counts) / max(int(counts.sum()), 1)
-    first, last = np.searchsorted(share, [OUTLYING, 1.0 - OUTLYING])
-    return int(first), int(min(last, len(counts) - 1))
-
-
-@styled
-def _plot_heights(
-    grid: Grid, z: np.ndarray, sigma: np.ndarray | None, name: str, subtitle: str, is_local: bool,
-    label: str = "σ of Z [m]",
-) -> Figure:  # fmt: skip
     width, height = _size(grid, WIDTH - 1.6 if sigma is None else (WIDTH - 3.8) / 2.0)
     figure = new_figure(height + 1.75, f"Surface – {plain(name)}", subtitle)
     left = axes_at(figure, 0.95, 0.75, width, height)
+    _draw_shape(left, grid, z)
+    _coordinates(left, width, height, local=is_local)
+    if sigma is not None:
+        right = axes_at(figure, 0.95 + width + 0.95, 0.75, width, height)
+        image = _draw_grey(right, grid, sigma)
+        _coordinates(right, width, height, local=is_local)
+        right.set_ylabel("")
+        scale_beside(figure, right, image, "σ of Z [m]")
+    return figure
+
+
+def _draw_shape(axes: Axes, grid: Grid, z: np.ndarray) -> None:
+    """Heights lit from the north-west, with contours."""
     every = _every(z)
     shown = z[::every, ::every]
     light = LightSource(315, 45)
@@ -119,26 +131,18 @@ def _plot_heights(
     step = grid.cell_x * every
     shade = light.hillshade(filled, vert_exag=_exaggeration(filled), dx=step, dy=step)
     shade = np.where(np.isfinite(shown), shade, 1.0)
-    left.imshow(shade, cmap="gray", vmin=0.0, vmax=1.0, extent=_extent(grid), interpolation="nearest")
-    _contours(left, grid, z)
-    _coordinates(left, width, height, local=is_local)
-    if sigma is not None:
-        _plot_sigma(figure, 0.95 + width + 0.95, (width, height), grid, sigma[::every, ::every], is_local, label)
-    return figure
+    axes.imshow(shade, cmap="gray", vmin=0.0, vmax=1.0, extent=extent_of(grid.bounds), interpolation="nearest")
+    _contours(axes, grid, z)
 
 
-def _plot_sigma(
-    figure: Figure, place: float, size: tuple[float, float], grid: Grid, sigma: np.ndarray, is_local: bool,
-    label: str,
-) -> None:  # fmt: skip
-    """σ of the heights as grey tones, from `place` on; inches."""
-    right = axes_at(figure, place, 0.75, *size)
-    low, high = np.nanpercentile(sigma, [1, 99])
-    image = right.imshow(sigma, cmap="Greys", vmin=low, vmax=high, extent=_extent(grid), interpolation="nearest")
-    _coordinates(right, *size, local=is_local)
-    right.set_ylabel("")
-    scale = axes_at(figure, place + size[0] + 0.15, 0.75, 0.14, size[1])
-    figure.colorbar(image, cax=scale).set_label(label)
+def _draw_grey(axes: Axes, grid: Grid, values: np.ndarray) -> AxesImage:
+    """Values as grey tones, the hundredth part at either end as its bound."""
+    every = _every(values)
+    low, high = np.nanpercentile(values, [1, 99])
+    return axes.imshow(
+        values[::every, ::every], cmap="Greys", vmin=low, vmax=max(high, low + 1e-9), extent=extent_of(grid.bounds),
+        interpolation="nearest",
+    )  # fmt: skip
 
 
 @styled
@@ -165,8 +169,9 @@ def plot_pickets(outcome: TerrainOutcome, block_name: str) -> Figure:
         if wrong.any():
             style: dict[str, Any] = {"c": INK} if mark in "x+" else {"facecolors": "none", "edgecolors": INK}
             axes.scatter(*p.xyz[wrong, :2].T, s=22, marker=mark, lw=0.8, label=name, **style)
-    axes.set_xlim(_extent(grid)[:2])
-    axes.set_ylim(_extent(grid)[2:])
+    left, bottom, right, top = grid.bounds
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
     _coordinates(axes, width, height, local=outcome.photographs.places.frame is None)
     tall = float(figure.get_size_inches()[1])
     figure.legend(loc="center left", bbox_to_anchor=(0.7 / WIDTH, 0.25 / tall), ncols=7, borderaxespad=0.0,
@@ -192,7 +197,7 @@ def plot_comparison(comparison: Comparison, title: str) -> Figure:
     limit = float(np.nanpercentile(np.abs(d), 98)) or 1e-3
     axes.set_facecolor(HOLE)
     every = _every(d)
-    image = axes.imshow(d[::every, ::every], cmap="Greys_r", vmin=-limit, vmax=limit, extent=_extent(c.grid),
+    image = axes.imshow(d[::every, ::every], cmap="Greys_r", vmin=-limit, vmax=limit, extent=extent_of(c.grid.bounds),
                         interpolation="nearest")  # fmt: skip
     _coordinates(axes, width, height, local=False, labels=("X [m]", "Y [m]"))
     scale = axes_at(figure, 0.95 + width + 0.12, 0.75, 0.14, height)
@@ -218,11 +223,6 @@ def _size(grid: Grid, widest: float) -> tuple[float, float]:
     ratio = grid.rows * grid.cell_y / (grid.columns * grid.cell_x)
     width = min(widest, HIGHEST / ratio)
     return width, width * ratio
-
-
-def _extent(grid: Grid) -> tuple[float, float, float, float]:
-    right, low = grid.left + grid.columns * grid.cell_x, grid.top - grid.rows * grid.cell_y
-    return grid.left, right, low, grid.top
 
 
 def _every(values: np.ndarray) -> int:
@@ -259,8 +259,7 @@ def _contours(axes: Axes, grid: Grid, z: np.ndarray) -> None:
 
 
 def _coordinates(axes: Axes, width: float, height: float, local: bool, labels: tuple[str, str] | None = None) -> None:
-    names = labels or (("X (local) [m]", "Y (local) [m]") if local else ("E [m]", "N [m]"))
-    coordinate_axes(axes, width, height, names)
+    coordinate_axes(axes, width, height, labels or coordinate_names(local))
 
 
 def _signed(axes: Axes) -> None:

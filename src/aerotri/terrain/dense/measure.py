@@ -76,6 +76,7 @@ class DenseOutcome:
     cells : that have a height. shared_cells : cells a side of the square that has one noise.
     across_px : median shift across the base of a pair. factors : of the tiles. pairs : matched in all tiles.
     resumed : tiles that an earlier run had made. pixel : m of height that a pixel of parallax is, of the median tile.
+    edge : share of the format at its edge that was not used.
     """
 
     grid: Grid
@@ -92,6 +93,7 @@ class DenseOutcome:
     pairs: np.ndarray
     resumed: int
     pixel: float
+    edge: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +286,7 @@ def _outcome(
     return DenseOutcome(
         grid, tuple(windows), files, shared_part(calibration, photographs, plan.rows, np.array(places), measured),
         photographs, plan.paths, level, cells, float(np.median(told)) if len(told) else np.nan, np.concatenate(across),
-        np.array(factors), np.concatenate(pairs), resumed, float(np.median(pixels)),
+        np.array(factors), np.concatenate(pairs), resumed, float(np.median(pixels)), plan.edge,
     )  # fmt: skip
 
 
