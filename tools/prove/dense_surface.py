@@ -40,7 +40,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, grey_closing
 
 import aerotri
 from aerotri.public.dense import DenseSurface
@@ -175,6 +175,10 @@ HELD_HEAD = (
     "| beside steps, draws not used | cells | std z | ± | of draws | > 4 σ | ± | of draws | σ / e |\n"
     "|---|---|---|---|---|---|---|---|---|"
 )
+NARROW_HEAD = (
+    "| beside steps | in gaps narrower than three cells | std z | > 4 σ | other cells | std z | > 4 σ |\n"
+    "|---|---|---|---|---|---|---|"
+)
 ERRING_HEAD = (
     "| erring camera | residual px | cover | NMAD px | alone: σ px | std z | > 4 σ | σ px | z |"
     " ± | of draws | > 4 σ |\n|---|---|---|---|---|---|---|---|---|---|---|---|"
@@ -186,6 +190,7 @@ class Cells:
     """Errors and σ, m, of the cells that have a height; whether each is steep; share of those that could have one.
 
     slope : of the true ground, metres a metre. shared : m, σ by the adjustment.
+    narrow : whether a cell lies in a gap narrower than three cells, with higher ground on both sides.
     sums : by side, the sums of the errors over squares over their σ, by what neighbours share.
     residual : px, σ̂0 of an image coordinate.
     """
@@ -197,6 +202,7 @@ class Cells:
     coverage: float
     sums: dict[int, np.ndarray]
     shared: np.ndarray
+    narrow: np.ndarray
     residual: float = 0.0
 
 
@@ -209,7 +215,7 @@ def main() -> None:
     add_executor(parser)
     arguments = parser.parse_args()
     folder = folder_of(arguments.folder, arguments)
-    added, by_slope = [], []
+    added, by_slope, beside = [], [], {}
     with runs_of(arguments) as runs:
         if arguments.held:
             tell_held([name for name in arguments.scenes if name in BESIDE_STEPS], arguments.seed, runs, folder)
@@ -227,17 +233,20 @@ def main() -> None:
             print(row(name, own, alone), flush=True)
             added.append(f"| {name} | " + " | ".join(of_sums(own.sums[side]) for side in SIDES) + " |")
             by_slope.append(f"| {name} | " + " | ".join(of_slope(own, *bounds) for bounds in SLOPES.values()) + " |")
+            beside[name] = own
         if added:
             print("\n| std z by slope, and beyond 4 σ | " + " | ".join(SLOPES) + " |\n|---|---|---|---|")
             print(*by_slope, sep="\n")
             print("\n| sums over squares of, cells | " + " | ".join(map(str, SIDES)) + " |\n|---|---|---|---|---|---|")
             print(*added, sep="\n")
+        tell_narrow(beside)
         tell_erring([name for name in arguments.scenes if name in ERRING], arguments.seed, runs, folder)
 
 
 def tell_held(names: list[str], seeds: list[int] | None, runs: Runs, folder: Path) -> None:
     """The table of cells beside steps of draws on which no constant was chosen."""
     print(HELD_HEAD, flush=True)
+    beside = {}
     for name in names:
         draws = [own for own, _ in runs(of_seed, (folder, name, False), seeds or HELD, BYTES_OF_SEED)]
         own, each = together(draws), [(d.error / d.sigma)[d.steep] for d in draws]
@@ -249,6 +258,21 @@ def tell_held(names: list[str], seeds: list[int] | None, runs: Runs, folder: Pat
             f"{rms(own.sigma[own.steep]) / rms(own.error[own.steep]):.2f}",
         )  # fmt: skip
         print(f"| {name} | " + " | ".join(numbers) + " |", flush=True)
+        beside[name] = own
+    tell_narrow(beside)
+
+
+def tell_narrow(scenes: dict[str, Cells]) -> None:
+    """The table of cells in narrow gaps beside steps, and of the other cells there, of the scenes that have any."""
+    found = {name: own for name, own in scenes.items() if (own.narrow & own.steep).any()}
+    if found:
+        print("\n" + NARROW_HEAD, flush=True)
+    for name, own in found.items():
+        z = own.error / own.sigma
+        parts = []
+        for of in (own.steep & own.narrow, own.steep & ~own.narrow):
+            parts += [f"{of.sum()}", f"{np.std(z[of]):.2f}", f"{share_beyond(z[of]):.2f} %"]
+        print(f"| {name} | " + " | ".join(parts) + " |", flush=True)
 
 
 def of_mean(values: list[float]) -> float:
@@ -333,7 +357,8 @@ def kept(file: Path) -> tuple[Cells, Cells]:
         first, second = (
             Cells(
                 *(read[f"{k}_{name}"] for name in ("error", "sigma", "steep", "slope")), float(read[f"{k}_coverage"]),
-                {side: read[f"{k}_sums_{side}"] for side in SIDES}, read[f"{k}_shared"], float(read[f"{k}_residual"]),
+                {side: read[f"{k}_sums_{side}"] for side in SIDES}, read[f"{k}_shared"], read[f"{k}_narrow"],
+                float(read[f"{k}_residual"]),
             )
             for k in (0, 1)
         )  # fmt: skip
@@ -369,7 +394,7 @@ def blocks(block: aerotri.Block, name: str, seed: int) -> list[aerotri.Block]:
 
 def together(draws: list[Cells]) -> Cells:
     """The cells of several draws as if they were one."""
-    names = "error", "sigma", "steep", "slope", "shared"
+    names = "error", "sigma", "steep", "slope", "shared", "narrow"
     cells = {of: np.concatenate([getattr(d, of) for d in draws]) for of in names}
     sums = {side: np.concatenate([d.sums[side] for d in draws]) for side in SIDES}
     return Cells(**cells, coverage=float(np.mean([d.coverage for d in draws])), sums=sums)
@@ -417,7 +442,7 @@ def semi_global_surface(result: aerotri.Adjustment, photographs: Path) -> DenseS
 def cells_of(found: DenseSurface, flight, name: str) -> Cells:
     """The cells of a surface against the true ground, where a scene is judged."""
     o = found.record
-    errors, sigmas, steeps, slopes, shares, able, measured = [], [], [], [], [], 0, 0
+    errors, sigmas, steeps, slopes, shares, narrow, able, measured = [], [], [], [], [], [], 0, 0
     sums: dict[int, list[float]] = {side: [] for side in SIDES}
     length = found.summary["noise_length_m"] or 0.0
     lasting = Lasting(*lasting_errors(o.pixel, float(np.median(o.photographs.gsd)) * 2**o.level))
@@ -441,6 +466,7 @@ def cells_of(found: DenseSurface, flight, name: str) -> Cells:
         share = o.shared.over(grid)
         sigma = np.hypot(part.sigma, share) if name in TIE_SIGMA_MM else part.sigma
         shares.append(share[known])
+        narrow.append(in_narrow_gap(truth)[known])
         sigmas.append(sigma[known])
         steeps.append(steep[known])
         slopes.append(np.hypot(*np.gradient(truth, grid.cell_x))[known])
@@ -451,7 +477,14 @@ def cells_of(found: DenseSurface, flight, name: str) -> Cells:
     return Cells(
         *(np.concatenate(part) for part in (errors, sigmas, steeps, slopes)), measured / max(able, 1),
         {side: np.array(own) for side, own in sums.items()}, np.concatenate(shares),
+        np.concatenate(narrow),
     )  # fmt: skip
+
+
+def in_narrow_gap(truth: np.ndarray) -> np.ndarray:
+    """(rows, columns) whether ground a step higher lies on both sides of a cell, less than three cells apart."""
+    closed = np.maximum(grey_closing(truth, (3, 1)), grey_closing(truth, (1, 3)))
+    return closed - truth > STEEP_M
 
 
 def sums_over_squares(
