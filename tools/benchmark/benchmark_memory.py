@@ -33,7 +33,8 @@ LAP = 0.65
 SIZE = (11500, 7500)
 TINTS = (0.9, 1.0, 0.8)
 BLOCK = 256
-HEAD = "| command | cells, millions | photographs | time s | peak memory GB |\n|---|---|---|---|---|"
+HEAD = "| command | cells, millions | photographs | time s | of the processor s | peak memory GB |"
+HEAD += "\n|---|---|---|---|---|---|"
 CODE = """
 import atexit
 from pathlib import Path
@@ -80,10 +81,11 @@ def _measure(folder: Path, arguments: argparse.Namespace) -> None:
     }
     for name in arguments.commands:
         rest = commands[name]
-        seconds, peak = _run(folder, name, "result", "block/photographs", *rest)
+        seconds, processor, peak = _run(folder, name, "result", "block/photographs", *rest)
         with rasterio.open(folder / name / f"{name}.tif") as file:
             cells = file.width * file.height / 1e6
-        print(f"| `{name}` | {cells:.0f} | {len(photographs)} | {seconds:.0f} | {peak / 1e9:.2f} |", flush=True)
+        row = name, cells, len(photographs), seconds, processor, peak / 1e9
+        print("| `{}` | {:.0f} | {} | {:.0f} | {:.0f} | {:.2f} |".format(*row), flush=True)
 
 
 def _make_block(folder: Path, arguments: argparse.Namespace) -> None:
@@ -111,21 +113,23 @@ control = {{ distance_bases = 1.0, sigma_m = [0.02, 0.02, 0.02] }}
 """
 
 
-def _run(folder: Path, *words: str) -> tuple[float, float]:
-    """Time, s, and peak memory, bytes, of a command.
+def _run(folder: Path, *words: str) -> tuple[float, float, float]:
+    """Time and time of the processor, s, and peak memory, bytes, of a command.
 
     Raises
     ------
     RuntimeError
         When it fails.
     """
-    begun = time.perf_counter()
+    begun, before = time.perf_counter(), os.times()
     with (folder / "said.txt").open("w", encoding="utf-8") as said:
         done = subprocess.run([sys.executable, "-c", CODE, *words], cwd=folder, stdout=said, stderr=said, check=False)
     if done.returncode:
         raise RuntimeError((folder / "said.txt").read_text(encoding="utf-8"))
-    seconds, status = time.perf_counter() - begun, (folder / "status.txt").read_text(encoding="utf-8")
-    return seconds, 1024.0 * int(status.split("VmHWM:")[1].split()[0])
+    seconds, after = time.perf_counter() - begun, os.times()
+    processor = after.children_user + after.children_system - before.children_user - before.children_system
+    status = (folder / "status.txt").read_text(encoding="utf-8")
+    return seconds, processor, 1024.0 * int(status.split("VmHWM:")[1].split()[0])
 
 
 def _in_colour(path: Path) -> None:

@@ -14,9 +14,9 @@ Last result, eight draws:
 
     | scene | places | displacement m | σ m | z | > 3 σ | with image part z | z of draws | as if independent z |
     |---|---|---|---|---|---|---|---|---|
-    | undulating | 12187 | 0.171 | 0.162 | 1.05 | 0.07 % | 0.56 | 0.74 to 1.41 | 0.93 |
-    | hill | 12167 | 0.181 | 0.162 | 1.14 | 1.44 % | 0.61 | 0.93 to 1.37 | 1.02 |
-    | houses | 12007 | 0.167 | 0.168 | 1.02 | 0.57 % | 0.55 | 0.66 to 1.57 | 0.92 |
+    | undulating | 12189 | 0.171 | 0.162 | 1.05 | 0.08 % | 0.56 | 0.74 to 1.41 | 0.94 |
+    | hill | 12173 | 0.181 | 0.177 | 1.10 | 1.38 % | 0.60 | 0.85 to 1.37 | 0.99 |
+    | houses | 12012 | 0.168 | 0.168 | 1.02 | 0.55 % | 0.55 | 0.66 to 1.57 | 0.92 |
 
     python tools/prove/ortho_sigma.py [FOLDER] [--draws 5] [--scenes houses …] [--figure FILE]
 """
