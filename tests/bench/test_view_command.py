@@ -20,8 +20,10 @@ pytest.importorskip("starlette", reason="the bench takes the extra 'view'")
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGINT is sent as on Unix")
 def test_serves_until_it_is_interrupted(result):
+    """The address is there at once, where stdout is kept back in a pipe too."""
+    kept_back = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     words = [sys.executable, "-m", "aerotri.cli", "view", str(result), "--no-browser"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=kept_back) as process:
         try:
             line = process.stdout.readline()
             address = re.search(r"http://127\.0\.0\.1:\d+/[\w-]{30,}/", line)[0]

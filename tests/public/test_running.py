@@ -226,11 +226,11 @@ def test_command_lines_can_be_copied_with_spaces_in_names(fakes, photographs, tm
 def test_figures_of_steps_are_in_words(tmp_path):
     """No keys for programs, no True, no more digits than say something."""
     content = {
-        "adjustment": "5640662b60", "tiles_resumed": 0, "of_one_adjustment": True, "gsd_m": 0.058634,
-        "sigma_m": {"image": {"q90": 0.0007833}}, "area_m2": 2516.4, "notes": ["4 photographs are not there"],
+        "adjustment": "5640662b60", "ideal": True, "gsd_m": 0.058634, "sigma_Z_m": {"matching": 0.0007833},
+        "notes": ["4 photographs are not there"],
     }  # fmt: skip
-    (tmp_path / "ortho.json").write_text(json.dumps(content), encoding="utf-8")
+    (tmp_path / "dtm.json").write_text(json.dumps(content), encoding="utf-8")
     assert _figures(tmp_path) == [
-        ("surface of the same adjustment", "yes"), ("GSD [m]", "0.0586"), ("area [m²]", "2516"),
-        ("σ of positions [m]: image: 90 % below", "0.000783"), ("", "4 photographs are not there"),
+        ("ideal", "yes"), ("GSD [m]", "0.0586"), ("σ of heights [m]: matching", "0.000783"),
+        ("", "4 photographs are not there"),
     ]  # fmt: skip

@@ -99,10 +99,11 @@ class Console:
         self.work("comparing", (number - 1) / count, f"{number} of {count}, {name}")
 
     def lines(self, lines: Iterable[str]) -> None:
-        """Print the outcome."""
+        """Print the outcome; at once, also where stdout is no terminal."""
         self._clear()
         for line in lines:
             print(line)
+        sys.stdout.flush()
 
     def note(self, text: str) -> None:
         """Print a sentence on what was done with the input; to stderr, so that JSON stays whole."""
