@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from aerotri.report.pages.run import run_page
 from aerotri.results.head import Head
 
@@ -30,3 +32,21 @@ def test_plots_of_a_step_come_in_their_order_with_what_they_show(tmp_path):
     places = [page.index(text) for text in ("Terrain with objects, lit", "σ of the heights", "Ground points (pickets)",
                                             "another one")]  # fmt: skip
     assert places == sorted(places)
+
+
+@pytest.mark.parametrize("name", ["dsm", "ortho"])
+def test_products_of_a_version_before_are_shown_by_their_numbers(tmp_path, name):
+    """They do not say what the adjustment was like: nothing may call it accepted."""
+    (tmp_path / name).mkdir()
+    content = {
+        "gsd_m": 0.02,
+        "cell_m": 0.04,
+        "sigma_Z_m": {"median": 0.1},
+        "sigma_m": {"total": {"median": 0.1, "q95": 0.2}},
+    }
+    (tmp_path / name / f"{name}.json").write_text(json.dumps(content), encoding="utf-8")
+    step = {"name": name, "folder": name, "what": "Product", "status": "done", "reason": "", "seconds": 1.0,
+            "arguments": [name]}  # fmt: skip
+    page = run_page({"source": "photographs", "steps": [step], "seconds": 1.0}, tmp_path, Head())
+    assert "GSD [m]" in page
+    assert "accepted" not in page

@@ -180,9 +180,12 @@ def _step(step: dict[str, Any], folder: Path, shown: set[Path]) -> dict[str, Any
 
 
 def _parts_of(name: str, folder: Path) -> ProductParts | None:
-    """What the own page of a step says, without its pictures; None for steps that have none of this kind."""
+    """What the own page of a step says, without its pictures; None for steps that have none of this kind.
+
+    Files of a version that did not say how good the adjustment is have no such page either.
+    """
     content = _read(folder / f"{name}.json") if name in PRODUCTS else {}
-    return PRODUCTS[name](content) if content else None
+    return PRODUCTS[name](content) if "adjusted" in content else None
 
 
 def _in_order(folder: Path, names: list[str]) -> list[Path]:
