@@ -637,9 +637,24 @@ def test_roughness_is_the_noise_of_heights_on_a_plane(lag):
     z = 50.0 + 0.4 * columns - 0.2 * rows + np.random.default_rng(1).normal(scale=0.3, size=rows.shape)
     z[50:60, 20:90] = np.nan
     z[:, 100:] += 30.0  # a step is no roughness
-    found = roughness(z, lag, np.full(z.shape, 5.0))
-    assert np.sqrt(np.mean(found[70:190, 10:190] ** 2)) == pytest.approx(0.3, rel=0.03)
+    found = roughness(z, CellScale(lag, 1.0), np.full(z.shape, 5.0))
+    assert np.sqrt(np.mean(found[70:190, 10:190] ** 2)) == pytest.approx(0.3, rel=0.05)
     assert np.isfinite(found).all()
+
+
+def test_ground_that_is_evenly_curved_is_not_rough():
+    rows, columns = np.mgrid[0:120, 0:120]
+    bowl = 100.0 + 0.03 * (columns - 60.0) ** 2 - 0.02 * (rows - 60.0) ** 2
+    step = np.full(bowl.shape, 5.0)
+    noise = np.random.default_rng(1).normal(scale=0.02, size=bowl.shape)
+    level, curved = (roughness(z + noise, SCALE, step) for z in (100.0, bowl))
+    np.testing.assert_allclose(curved, level, atol=2e-5)
+    assert np.sqrt(np.mean(roughness(bowl, SCALE, step) ** 2)) < 1e-4
+    # across a step nothing is taken off: windows on both sides bend the heights
+    stepped = bowl + np.where(columns < 60, 0.0, 12.0)
+    by_curvature = np.sqrt(0.24**2 / 6.0 / 2.0)
+    assert roughness(stepped, SCALE, step)[20:100, 56] == pytest.approx(by_curvature, rel=1e-3)
+    assert (roughness(stepped, SCALE, step)[20:100, :50] < 1e-4).all()
 
 
 def test_a_pair_far_from_the_surface_contradicts_it():

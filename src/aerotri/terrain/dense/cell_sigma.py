@@ -27,7 +27,7 @@ def cell_sigma(
     z, noise : (rows, columns) m, heights, NaN where there is none, and their σ by the matching.
     heights, sigmas : (pairs, rows, columns) m of which they were fused.
     """
-    rough = roughness(z, scale.lag, np.maximum(scale.pixel, np.sqrt(6.0) * STEP_SIGMAS * noise))
+    rough = roughness(z, scale, np.maximum(scale.pixel, np.sqrt(6.0) * STEP_SIGMAS * noise))
     beside = step_sigma(z, noise, others_seen(z, heights, sigmas, scale), scale)
     edge = EDGE_PX * scale.pixel * at_edge(z)
     return np.sqrt((NOISE_SHARE * noise) ** 2 + (ROUGH_SHARE * rough) ** 2 + beside**2 + edge**2)
@@ -38,14 +38,18 @@ def at_edge(z: np.ndarray) -> np.ndarray:
     return cv2.erode(np.isfinite(z).view(np.uint8), square(3)) == 0
 
 
-def roughness(z: np.ndarray, lag: int, step: np.ndarray) -> np.ndarray:
-    """(rows, columns) m, σ of a height as second differences over `lag` cells have it, in a square of 3 × 3 cells.
+def roughness(z: np.ndarray, scale: CellScale, step: np.ndarray) -> np.ndarray:
+    """(rows, columns) m, σ of a height as second differences over `scale.lag` have it, in a square of 3 × 3 cells.
+
+    Ground that is evenly curved is not rough: the mean of the second differences over two windows of the matching is
+    taken off.
 
     Parameters
     ----------
     step : (rows, columns) m, second differences beyond which are steps: they do not count.
     """
-    square, count = (np.zeros(z.shape, np.float32) for _ in range(2))
+    squares, count = (np.zeros(z.shape, np.float32) for _ in range(2))
+    lag = scale.lag
     for axis in (0, 1):
         if z.shape[axis] <= 2 * lag:
             continue
@@ -53,10 +57,21 @@ def roughness(z: np.ndarray, lag: int, step: np.ndarray) -> np.ndarray:
             z[tuple(part if a == axis else slice(None) for a in (0, 1))]
             for part in (slice(None, -2 * lag), slice(lag, -lag), slice(2 * lag, None))
         )
-        second = low - 2.0 * middle + high
+        second = (low - 2.0 * middle + high).astype(np.float32)
         inside = tuple(slice(lag, -lag) if a == axis else slice(None) for a in (0, 1))
         told = np.abs(second) <= step[inside]
+        second = np.where(told, second - _evenly_curved(second, told, scale.around), 0.0)
         # the variance of a second difference is six times that of a height
-        square[inside] += np.where(told, second * second / 6.0, 0.0)
+        squares[inside] += second * second / 6.0
         count[inside] += told
-    return np.sqrt(np.maximum(sum_about(square, 3), 0.0) / np.maximum(sum_about(count, 3), 1.0))
+    return np.sqrt(np.maximum(sum_about(squares, 3), 0.0) / np.maximum(sum_about(count, 3), 1.0))
+
+
+def _evenly_curved(second: np.ndarray, told: np.ndarray, side: int) -> np.ndarray:
+    """(rows, columns) float32 m, mean of second differences over a square; 0 where one of them is a step or not known.
+
+    A step bends the heights about it: the mean would take off what windows of the matching made of it.
+    """
+    mean = sum_about(np.where(told, second, np.float32(0.0)), side)
+    mean /= np.maximum(sum_about(told.astype(np.float32), side), 1.0)
+    return np.where(cv2.erode(told.view(np.uint8), square(side)) > 0, mean, np.float32(0.0))
