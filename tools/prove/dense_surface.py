@@ -120,8 +120,8 @@ FIRST_CAMERA, CAMERAS = 101, 12
 TIE_SIGMA_MM, DRAWS = {"y-parallax": 0.015}, 20
 """Error of tie points, and of how many draws of it the errors of a scene are taken together."""
 SEEDS = {
-    "houses": 4, "few photographs": 4, "wall": 4, "trees": 4, "repeated texture": 4, "shadow": 4, "glass": 4, "water": 4,
-    "self-calibrated": 4,
+    "houses": 4, "few photographs": 4, "wall": 4, "trees": 4, "repeated texture": 4, "shadow": 4, "glass": 4,
+    "water": 4, "self-calibrated": 4,
 }  # fmt: skip
 """Flights and textures of a scene whose errors are taken together: where few cells tell, or a few gross errors do."""
 BESIDE_STEPS, HELD = ("houses", "few photographs", "wall", "trees"), tuple(range(5, 13))
