@@ -25,11 +25,11 @@ Last result: tools/results/dense_surface.md.
 
 Steep cells of houses, few photographs, wall and trees have a table of their own as well (`--held`): eight draws on
 which no constant was chosen, together, with the smallest and the largest of a draw and what the mean of draws is good
-to (standard error over draws). Houses, few photographs, wall, trees, glass and water are four draws, on the
-first two of which the constants were chosen. On noisy or weak texture semi-global matching alone scatters less: it
-smooths over more than a window. What is measured of the glass is its rim, whose windows see ground. With tie points of
-half a pixel σ holds the adjustment, which all cells of a draw share: std z is then the root mean square of z over all
-cells of twenty draws, on the same photographs, and semi-global matching is that of the first.
+to (standard error over draws). Houses, few photographs, wall, trees and glass are twelve draws, on the first two of
+which the constants were chosen, water, repeated texture and shadow four. On noisy or weak texture semi-global matching
+alone scatters less: it smooths over more than a window. What is measured of the glass is its rim, whose windows see
+ground. With tie points of half a pixel σ holds the adjustment, which all cells of a draw share: std z is then the root
+mean square of z over all cells of twenty draws, on the same photographs, and semi-global matching is that of the first.
 """
 
 from __future__ import annotations
@@ -120,8 +120,8 @@ FIRST_CAMERA, CAMERAS = 101, 12
 TIE_SIGMA_MM, DRAWS = {"y-parallax": 0.015}, 20
 """Error of tie points, and of how many draws of it the errors of a scene are taken together."""
 SEEDS = {
-    "houses": 4, "few photographs": 4, "wall": 4, "trees": 4, "repeated texture": 4, "shadow": 4, "glass": 4,
-    "water": 4, "self-calibrated": 4,
+    "houses": 12, "few photographs": 12, "wall": 12, "trees": 12, "glass": 12, "water": 4, "repeated texture": 4,
+    "shadow": 4, "self-calibrated": 4,
 }  # fmt: skip
 """Flights and textures of a scene whose errors are taken together: where few cells tell, or a few gross errors do."""
 BESIDE_STEPS, HELD = ("houses", "few photographs", "wall", "trees"), tuple(range(5, 13))
@@ -228,7 +228,7 @@ def main() -> None:
         for name in known:
             seeds = list(range(1, SEEDS.get(name, 1) + 1)) if not arguments.seed else arguments.seed
             try:
-                found = runs(of_seed, (folder, name, True), seeds, BYTES_OF_SEED)
+                found = runs(of_seed, (folder, name), seeds, BYTES_OF_SEED)
             except aerotri.InputError as error:
                 print(f"| {name} | {str(error).partition(' — ')[0]} |", flush=True)
                 continue
@@ -251,7 +251,7 @@ def tell_held(names: list[str], seeds: list[int] | None, runs: Runs, folder: Pat
     print(HELD_HEAD, flush=True)
     beside = {}
     for name in names:
-        draws = [own for own, _ in runs(of_seed, (folder, name, False), seeds or HELD, BYTES_OF_SEED)]
+        draws = [own for own, _ in runs(of_seed, (folder, name), seeds or HELD, BYTES_OF_SEED)]
         own, each = together(draws), [(d.error / d.sigma)[d.steep] for d in draws]
         z = (own.error / own.sigma)[own.steep]
         spreads, shares = [float(np.std(one)) for one in each], [share_beyond(one) for one in each]
@@ -289,7 +289,7 @@ def tell_erring(names: list[str], seeds: list[int] | None, runs: Runs, folder: P
         print("\n" + ERRING_HEAD, flush=True)
     for name in names:
         drawn = seeds or list(range(FIRST_CAMERA, FIRST_CAMERA + SEEDS.get(name, CAMERAS)))
-        draws = [own for own, _ in runs(of_seed, (folder, name, False), drawn, BYTES_OF_SEED)]
+        draws = [own for own, _ in runs(of_seed, (folder, name), drawn, BYTES_OF_SEED)]
         own = together(draws)
         z, total = own.error / own.sigma, own.error / np.hypot(own.sigma, own.shared)
         single = [rms(d.error / np.hypot(d.sigma, d.shared)) for d in draws]
@@ -335,14 +335,14 @@ def row(name: str, own: Cells, alone: Cells) -> str:
     return f"| {name} | " + " | ".join(numbers) + " |"
 
 
-def of_seed(shared: tuple[Path, str, bool], seed: int) -> tuple[Cells, Cells]:
+def of_seed(shared: tuple[Path, str], seed: int) -> tuple[Cells, Cells]:
     """`measured` of a scene, in a folder of its own, and kept there."""
-    folder, name, compared = shared
+    folder, name = shared
     place = folder / name.replace(",", "").replace(" ", "_") / f"seed_{seed}"
     file = place / "cells.npz"
     if file.is_file():
         return kept(file)
-    both = measured(place, name, seed, compared)
+    both = measured(place, name, seed)
     keep(file, both)
     return both
 
@@ -368,8 +368,8 @@ def kept(file: Path) -> tuple[Cells, Cells]:
     return first, second
 
 
-def measured(folder: Path, name: str, seed: int, compared: bool) -> tuple[Cells, Cells]:
-    """The cells of one flight, and those of semi-global matching alone; the same where that is not compared."""
+def measured(folder: Path, name: str, seed: int) -> tuple[Cells, Cells]:
+    """The cells of one flight, and those of semi-global matching alone; of a camera that errs the same again."""
     ground, look = SCENES[name]
     spec = SPEC | {"terrain": {"height_m": 50.0} | ground}
     spec |= {table: SPEC[table] | other for table, other in OTHER_SPEC.get(name, {}).items()}
@@ -381,7 +381,6 @@ def measured(folder: Path, name: str, seed: int, compared: bool) -> tuple[Cells,
     own = together([cells_of(aerotri.dense_surface(result, photographs), flight, name) for result in results])
     if name in ERRING:
         own = replace(own, residual=results[0].adjusted.outcome.sigma0_um / SPEC["camera"]["cam"]["pixel_um"])
-    if not compared:
         return own, own
     return own, cells_of(semi_global_surface(results[0], photographs), flight, name)
 
