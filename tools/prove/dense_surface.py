@@ -234,12 +234,14 @@ def main() -> None:
                 continue
             own, alone = (together([pair[k] for pair in found]) for k in (0, 1))
             print(row(name, own, alone), flush=True)
-            added.append(f"| {name} | " + " | ".join(of_sums(own.sums[side]) for side in SIDES) + " |")
+            if name not in TIE_SIGMA_MM:  # all cells of a draw share the errors of its adjustment
+                added.append(f"| {name} | " + " | ".join(of_sums(own.sums[side]) for side in SIDES) + " |")
             by_slope.append(f"| {name} | " + " | ".join(of_slope(own, *bounds) for bounds in SLOPES.values()) + " |")
             beside[name] = own
-        if added:
+        if by_slope:
             print("\n| std z by slope, and beyond 4 σ | " + " | ".join(SLOPES) + " |\n|---|---|---|---|")
             print(*by_slope, sep="\n")
+        if added:
             print("\n| sums over squares of, cells | " + " | ".join(map(str, SIDES)) + " |\n|---|---|---|---|---|---|")
             print(*added, sep="\n")
         tell_narrow(beside)
