@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from aerotri.public.surfaces import SurfaceLike
     from aerotri.results.adjustment import Adjustment as Record
     from aerotri.terrain.ortho.accuracy import HeightSigma
+    from aerotri.terrain.ortho.balance import Balance
     from aerotri.terrain.ortho.make import OrthoOutcome
 
 RECORD, SEAMS, PAGE = "ortho.json", "seams.gpkg", "ortho.html"
@@ -207,7 +208,7 @@ def _made(
         room = tiles if in_threads or tiles is not None else stack.enter_context(room_beside(out))
         made = make_orthophoto(record, taken, heights, sigma, settings, folder, report.stage, room, workers)
         lacks = missing_in_sigma(record)
-        notes += (*_blurred(made.blur, taken[1]), *((lacks,) if lacks else ()))
+        notes += (*_blurred(made.blur, taken[1]), *_off(made.balance, taken[1]), *((lacks,) if lacks else ()))
         notes += missing_in_words(missing, photographs)
         said = {"photographs_missing": list(missing), "notes": list(notes)}
         head = Head(record.result.block.project, record.result.block.crs)
@@ -294,13 +295,31 @@ def _blurred(blur: np.ndarray, paths: Sequence[Path]) -> tuple[str, ...]:
     worst = [int(k) for k in np.argsort(-blur, kind="stable") if blur[k] > 1.0]
     if not worst:
         return ()
-    named = ", ".join(f"{paths[k].name} ({100.0 / blur[k]:.0f} %)" for k in worst[:MOST_NAMED])
-    more = ", and others" if len(worst) > MOST_NAMED else ""
+    named = _named(worst, 1.0 / blur, paths)
     said = "shows" if len(worst) == 1 else "show"
     return (
         f"{counted(len(worst), 'photograph')} {said} less detail than others of the same ground, as blurred ones do: "
-        f"{named}{more}; sharper ones are taken where there are any",
+        f"{named}; sharper ones are taken where there are any",
     )
+
+
+def _off(balance: Balance, paths: Sequence[Path]) -> tuple[str, ...]:
+    """A sentence on photographs whose colours do not agree with those of others."""
+    worst = balance.off.tolist()
+    if not worst:
+        return ()
+    differ = "differs" if len(worst) == 1 else "differ"
+    return (
+        f"the colours of {counted(len(worst), 'photograph')} {differ} from others of the same ground far more than is "
+        f"usual in this block, by (share of white): {_named(worst, balance.left, paths)}; look for clouds, shadows of "
+        "clouds, snow or a wrong photograph",
+    )
+
+
+def _named(worst: Sequence[int], shares: np.ndarray, paths: Sequence[Path]) -> str:
+    """Names with shares of theirs, not too many."""
+    more = ", and others" if len(worst) > MOST_NAMED else ""
+    return ", ".join(f"{paths[k].name} ({100.0 * shares[k]:.0f} %)" for k in worst[:MOST_NAMED]) + more
 
 
 def _opened(given: MeasuredSurface, record: Record, stack: ExitStack) -> tuple[Any, HeightSigma, tuple[str, ...]]:

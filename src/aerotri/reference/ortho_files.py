@@ -83,6 +83,12 @@ ORTHO_JSON = (
     Item("photographs[].area_m2", "number", "Area taken from it.", "m²"),
     Item("photographs[].gain[]", "number", "Factor of its colours, by band."),
     Item("photographs[].offset[]", "number", "Added to its colours, by band, share of white."),
+    Item(
+        "photographs[].difference",
+        "number?",
+        "Robust standard deviation of the difference from other photographs of the same ground, with gains and "
+        "offsets, share of white; null where it has no ground in common with others.",
+    ),
     *ADJUSTED,
     Item("notes[]", "text", "What was done with the input, and what σ lacks, in sentences."),
     *ARGUMENTS,

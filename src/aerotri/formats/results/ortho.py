@@ -85,10 +85,10 @@ def ortho_json(outcome: OrthoOutcome, block: Block, surface: str, resampling: st
         "photographs": [
             {
                 "number": k, "photograph": str(name), "area_m2": int(cells) * area, "gain": gain.tolist(),
-                "offset": offset.tolist(),
+                "offset": offset.tolist(), "difference": _number(left),
             }
-            for k, (name, cells, gain, offset) in enumerate(
-                zip(o.photographs.names, o.cells, o.balance.gain, o.balance.offset, strict=True)
+            for k, (name, cells, gain, offset, left) in enumerate(
+                zip(o.photographs.names, o.cells, o.balance.gain, o.balance.offset, o.balance.left, strict=True)
             )
         ],
     }  # fmt: skip

@@ -5,6 +5,10 @@ ln g_a + ln s_a = ln g_b + ln s_b ± √((1 − r²)/n), and with these gains g_
 of the differences. Both are adjusted one after the other. (The sum of squares of g_a·c_a + o_a − g_b·c_b − o_b is no
 good measure: noise makes it smaller with every smaller gain, from photograph to photograph.) A photograph that overlaps
 little is held by pseudo-observations g = 1 ± `GAIN_SIGMA`, o = 0 ± `OFFSET_SIGMA`; the means of ln g and o are 0.
+
+What does not belong to the ground (cars, water) is left out. Before gains are known it looks like a few photographs of
+another exposure, so the first adjustment takes the cells that follow the relation of most cells of their own pair,
+which holds for any exposure; only then all cells are held against one limit.
 """
 
 from __future__ import annotations
@@ -22,6 +26,8 @@ DARKEST, BRIGHTEST = 0.01, 0.98
 """Colours that count, shares of white: others are clipped."""
 LIMIT, ROUNDS = 2.5, 4
 """Differences beyond this number of robust standard deviations do not count [C]: cars, water, trees; and rounds."""
+LEAST_LIMIT = 2.5e-4
+"""Share of white that differences may always have [C]: where photographs are free of noise."""
 FEWEST_CELLS = 10
 """Of a pair of photographs [C]."""
 NOISE = 1e-3
@@ -32,6 +38,9 @@ MOST_CELLS = 100_000
 """Coarse cells that colours are held against one another in; of more, rows and columns are left out evenly [C]."""
 MOST_COUNTED = 20_000_000
 """Pairs of photographs that are counted in a table; more are sorted."""
+FAR, VISIBLE = 3.0, 0.02
+"""A photograph that is off differs from others so many times as much as photographs do at the median, and at least by
+so much of white [C]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,54 +51,125 @@ class Balance:
     ----------
     gain : (n, bands). offset : (n, bands), shares of white.
     before, after : robust standard deviation of the difference of two photographs, shares of white; NaN without any.
+    left : (n,) the same of every photograph from others, after.
     """
 
     gain: np.ndarray
     offset: np.ndarray
     before: float
     after: float
+    left: np.ndarray
+
+    @property
+    def off(self) -> np.ndarray:
+        """Numbers of the photographs that agree with the others far less than these do, the worst first."""
+        known = self.left[np.isfinite(self.left)]
+        if not len(known):
+            return np.zeros(0, np.intp)
+        order = np.argsort(-self.left, kind="stable")
+        return order[self.left[order] > max(FAR * float(np.median(known)), VISIBLE)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Pairs:
+    """Cells that two photographs show, of one band.
+
+    Parameters
+    ----------
+    a, b : (k,) photographs. at : (m,) the pair of every cell. x, y : (m,) colours in a and in b.
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+    at: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
 
 
 def no_balance(count: int, candidates: Candidates) -> Balance:
     """Colours as they are."""
+    candidates = _thinned(candidates)
     bands = candidates.value.shape[1]
     gain, offset = np.ones((count, bands)), np.zeros((count, bands))
-    spread = _spread(_differences(candidates, gain, offset))
-    return Balance(gain, offset, spread, spread)
+    difference = _differences(candidates, gain, offset)
+    spread = _spread(difference)
+    return Balance(gain, offset, spread, spread, _left(count, candidates, difference))
 
 
 def balance_of(count: int, candidates: Candidates) -> Balance:
     """Gains and offsets of n photographs."""
+    candidates = _thinned(candidates)
+    found = no_balance(count, candidates)
+    if np.isnan(found.before):
+        return found
+    gain, offset = found.gain, found.offset
+    for band in range(gain.shape[1]):
+        gain[:, band], offset[:, band] = _of_band(count, _pairs(candidates, band))
+    difference = _differences(candidates, gain, offset)
+    return Balance(gain, offset, found.before, _spread(difference), _left(count, candidates, difference))
+
+
+def _thinned(candidates: Candidates) -> Candidates:
     every = max(int(np.sqrt(candidates.z.size / MOST_CELLS)), 1)
     thin = np.s_[..., ::every, ::every]
-    candidates = replace(candidates, found=candidates.found[thin], value=candidates.value[thin], z=candidates.z[thin])
-    bands = candidates.value.shape[1]
-    gain, offset = np.ones((count, bands)), np.zeros((count, bands))
-    before = _spread(_differences(candidates, gain, offset))
-    if np.isnan(before):
-        return Balance(gain, offset, before, before)
+    return replace(candidates, found=candidates.found[thin], value=candidates.value[thin], z=candidates.z[thin])
+
+
+def _of_band(count: int, pairs: _Pairs) -> tuple[np.ndarray, np.ndarray]:
+    """Gains and offsets (n,) of one band."""
+    p = pairs
+    gain, offset = _solved(count, p, _follows_pair(p))
     for _ in range(ROUNDS):
-        difference = _differences(candidates, gain, offset)
-        for band in range(bands):
-            limit = LIMIT * max(_spread([d[band : band + 1] for d in difference]), 1e-4)
-            a, b, sums = _sums(candidates, difference, band, limit)
-            gain[:, band], offset[:, band] = _solved(count, a, b, sums)
-    return Balance(gain, offset, before, _spread(_differences(candidates, gain, offset)))
+        difference = np.abs(gain[p.a][p.at] * p.x + offset[p.a][p.at] - gain[p.b][p.at] * p.y - offset[p.b][p.at])
+        limit = LIMIT * SIGMA_PER_MAD * float(np.median(difference)) if len(difference) else 0.0
+        gain, offset = _solved(count, p, difference <= max(limit, LEAST_LIMIT))
+    return gain, offset
+
+
+def _follows_pair(pairs: _Pairs) -> np.ndarray:
+    """(m,) whether cells have the relation y = k·x + c of most cells of their pair, √k·x and y/√k being compared."""
+    at, n = pairs.at, len(pairs.a)
+    x, y = (v - _medians(at, v, n)[at] for v in (pairs.x, pairs.y))
+    one, other = (np.maximum(SIGMA_PER_MAD * _medians(at, np.abs(v), n), NOISE) for v in (x, y))
+    root = np.sqrt(other / one)[at]
+    difference = root * x - y / root
+    difference = np.abs(difference - _medians(at, difference, n)[at])
+    limit = LIMIT * SIGMA_PER_MAD * _medians(at, difference, n)
+    return difference <= np.maximum(limit, LEAST_LIMIT)[at]
+
+
+def _medians(at: np.ndarray, values: np.ndarray, n: int) -> np.ndarray:
+    """(n,) medians of the values of every group, of two middle ones the smaller; NaN without any."""
+    out = np.full(n, np.nan)
+    if not len(values):
+        return out
+    size = np.bincount(at, minlength=n)
+    group = np.flatnonzero(size)
+    # group and value in one number, which is sorted in a quarter of the time of both
+    low, span = float(values.min()), 2.0 * float(np.ptp(values)) or 1.0
+    ordered = np.sort(at + (values - low) / span)
+    middle = np.cumsum(size) - size + (size - 1) // 2
+    out[group] = (ordered[middle[group]] - group) * span + low
+    return out
 
 
 def balanced(candidates: Candidates, balance: Balance) -> np.ndarray:
     """(q, bands, r, c) float32 colours of the candidates."""
+    return _changed(candidates, balance.gain, balance.offset)
+
+
+def _changed(candidates: Candidates, gains: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     number = np.maximum(candidates.found, 0)
     out = np.empty_like(candidates.value)
     for band in range(out.shape[1]):
-        gain, offset = balance.gain[:, band].astype(np.float32), balance.offset[:, band].astype(np.float32)
+        gain, offset = gains[:, band].astype(np.float32), offsets[:, band].astype(np.float32)
         out[:, band] = candidates.value[:, band] * gain[number] + offset[number]
     return out
 
 
 def _differences(candidates: Candidates, gain: np.ndarray, offset: np.ndarray) -> list[np.ndarray]:
     """(bands, r, c) best less every other photograph of a cell; NaN where there is none."""
-    value = balanced(candidates, Balance(gain, offset, np.nan, np.nan))
+    value = _changed(candidates, gain, offset)
     return [value[0] - value[q] for q in range(1, len(value))]
 
 
@@ -101,26 +181,35 @@ def _spread(differences: list[np.ndarray]) -> float:
     return float(SIGMA_PER_MAD * np.median(np.abs(known))) if len(known) else float("nan")
 
 
-def _sums(
-    candidates: Candidates, differences: list[np.ndarray], band: int, limit: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs a, b (k,) and (k, 6) numbers of cells, Σ c_a, Σ c_b, Σ c_a², Σ c_b², Σ c_a·c_b."""
-    c = candidates
-    pairs, first, second = [], [], []
-    count = int(c.found.max()) + 1
+def _left(count: int, candidates: Candidates, differences: list[np.ndarray]) -> np.ndarray:
+    """(n,) robust standard deviations of the differences of photographs from others; NaN with few cells."""
+    number, size = [np.zeros(0, np.int32)], [np.zeros(0, np.float32)]
     for q, difference in enumerate(differences, start=1):
+        one = np.abs(difference).mean(axis=0)
+        known = np.isfinite(one)
+        for found in (candidates.found[0], candidates.found[q]):
+            number.append(found[known])
+            size.append(one[known])
+    at = np.concatenate(number)
+    out = SIGMA_PER_MAD * _medians(at, np.concatenate(size), count)
+    return np.where(np.bincount(at, minlength=count) >= FEWEST_CELLS, out, np.nan)
+
+
+def _pairs(candidates: Candidates, band: int) -> _Pairs:
+    """Of the best photograph of cells and every other one, without clipped colours."""
+    c = candidates
+    keys, first, second = [], [], []
+    count = int(c.found.max()) + 1
+    for q in range(1, len(c.found)):
         one, other = c.value[0, band], c.value[q, band]
-        usable = np.abs(difference[band]) <= limit
+        usable = np.ones(one.shape, bool)
         for value in (one, other):
             usable &= (value > DARKEST) & (value < BRIGHTEST)
-        pairs.append(c.found[0][usable].astype(np.int64) * count + c.found[q][usable])
+        keys.append(c.found[0][usable].astype(np.int64) * count + c.found[q][usable])
         first.append(one[usable].astype(float))
         second.append(other[usable].astype(float))
-    x, y = np.concatenate(first), np.concatenate(second)
-    which, at = _numbered(np.concatenate(pairs), count * count)
-    sums = np.stack([np.bincount(at, w, len(which)) for w in (np.ones_like(x), x, y, x * x, y * y, x * y)], axis=1)
-    enough = sums[:, 0] >= FEWEST_CELLS
-    return which[enough] // count, which[enough] % count, sums[enough]
+    which, at = _numbered(np.concatenate(keys), count * count)
+    return _Pairs(which // count, which % count, at, np.concatenate(first), np.concatenate(second))
 
 
 def _numbered(values: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
@@ -132,8 +221,13 @@ def _numbered(values: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
     return np.flatnonzero(there), (np.cumsum(there) - 1)[values]
 
 
-def _solved(n: int, a: np.ndarray, b: np.ndarray, sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gains and offsets (n,) of one band."""
+def _solved(n: int, pairs: _Pairs, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Gains and offsets (n,) of one band from the cells that count, (m,)."""
+    at, x, y = pairs.at[counts], pairs.x[counts], pairs.y[counts]
+    weights = (np.ones_like(x), x, y, x * x, y * y, x * y)
+    sums = np.stack([np.bincount(at, w, len(pairs.a)) for w in weights], axis=1)
+    enough = sums[:, 0] >= FEWEST_CELLS
+    a, b, sums = pairs.a[enough], pairs.b[enough], sums[enough]
     cells = sums[:, 0] / CORRELATED_CELLS
     ma, mb, aa, bb, ab = (sums[:, 1:] / sums[:, :1]).T
     va, vb = np.maximum(aa - ma * ma, NOISE**2), np.maximum(bb - mb * mb, NOISE**2)
