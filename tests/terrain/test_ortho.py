@@ -141,7 +141,8 @@ def test_detail_is_compared_where_two_show_the_same_ground(hills):
     none, found = np.zeros(shape, np.float32), found.astype(np.int32)
     detail = (ground * of[found]).astype(np.float32)
     c = Candidates(Grid(20, 30, 0.0, 20.0, 1.0, 1.0), 8, found, none, none, none, none[:, None], detail, none[0])
-    blur = blur_of(photographs, c)
+    np.testing.assert_array_equal(blur_of(photographs, c, 1.0 / of), 1.0)  # of half the exposure
+    blur = blur_of(photographs, c, np.ones(4))
     np.testing.assert_array_equal(blur[:3], 1.0)
     assert blur[3] == pytest.approx(2.0, rel=0.05)
     better = sharper_first(replace(c, cost=np.arange(3.0)[::-1, None, None] * 0.1 + none), photographs, 1.0, blur)
@@ -269,6 +270,7 @@ def test_gains_and_offsets_are_found(town, tmp_path):
     shifted = found.balance.offset[:, 0] * 65535.0 + found.balance.gain[:, 0] * offset
     assert np.ptp(shifted) < 0.02 * made.scene.options.mean
     assert found.balance.after < 0.2 * found.balance.before
+    np.testing.assert_array_equal(found.blur, 1.0)
 
 
 def test_narrow_holes_are_bridged_for_the_picture(hills, tmp_path):

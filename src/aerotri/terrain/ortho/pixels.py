@@ -120,6 +120,11 @@ class PixelStore:
             while self._bytes > most and self._kept:
                 self._bytes -= self._kept.popitem(last=False)[1].nbytes
 
+    @property
+    def detail_band(self) -> int:
+        """The band that `detail` looks at."""
+        return min(self.bands - 1, GREEN)
+
     def detail(self, k: int, times: float) -> np.ndarray | None:
         """(rows, columns) float32 mean change between pixels, of twice their size, of the whole photograph k, about so
         many times smaller; None of one that is too large to be held."""
@@ -129,7 +134,7 @@ class PixelStore:
         if whole is None:
             return None
         columns, rows = (max(int(side / max(times, 1.0)), 1) for side in self._sizes[k])
-        band = np.ascontiguousarray(whole[:, :, min(self.bands - 1, GREEN)])
+        band = np.ascontiguousarray(whole[:, :, self.detail_band])
         half = cv2.resize(band, (max(band.shape[1] // 2, 1), max(band.shape[0] // 2, 1)), interpolation=cv2.INTER_AREA)
         change = np.abs(cv2.Laplacian(half, cv2.CV_32F))
         return cv2.resize(change, (columns, rows), interpolation=cv2.INTER_AREA)

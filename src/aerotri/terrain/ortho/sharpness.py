@@ -1,8 +1,8 @@
 """How sharp photographs are, by the detail that they show of the same ground.
 
 A photograph out of focus, or moved while it was exposed, shows less detail than others of the same cells. What cells
-are made of cancels: every two photographs are compared where both are candidates, and only those whose pixels are about
-as large on the ground.
+are made of cancels, and so do exposures: every two photographs are compared where both are candidates, and only those
+whose pixels are about as large on the ground.
 """
 
 from __future__ import annotations
@@ -25,15 +25,20 @@ LEAST_BLUR = 1.25
 """From which on a photograph counts as blurred [C]: light and the angle of the ray change detail by less."""
 
 
-def blur_of(photographs: Photographs, candidates: Candidates) -> np.ndarray:
-    """(n,) by how much less detail photographs show than the others of the same ground; 1 where it is little."""
+def blur_of(photographs: Photographs, candidates: Candidates, gain: np.ndarray) -> np.ndarray:
+    """(n,) by how much less detail photographs show than the others of the same ground; 1 where it is little.
+
+    Parameters
+    ----------
+    gain : (n,) that brings their colours to one another: a dark photograph is not a blurred one.
+    """
     count, c = len(photographs), candidates
     size = np.log(photographs.gsd)
     keys, ratios = [], []
     for q in range(1, len(c.found)):
         there = (c.found[q] >= 0) & (c.detail[0] > 0.0) & (c.detail[q] > 0.0)
         a, b = c.found[0][there].astype(np.int64), c.found[q][there].astype(np.int64)
-        ratio = np.log(c.detail[0][there] / c.detail[q][there])
+        ratio = np.log(gain[a] * c.detail[0][there] / (gain[b] * c.detail[q][there]))
         alike = np.abs(size[a] - size[b]) < ALIKE
         keys.append((a * count + b)[alike])
         ratios.append(np.clip(ratio[alike], -LARGEST, LARGEST))
