@@ -40,6 +40,35 @@ def made(tmp_path_factory):
     return here, result, found
 
 
+def test_a_photograph_behind_clouds_is_named(tmp_path):
+    """Nothing is said of one that is only darker."""
+    plan = PLAN | {"flight": PLAN["flight"] | {"images_per_strip": 6, "end_lap": 0.8}}
+    flight = aerotri.simulate(plan, seed=3)
+    flight.save(tmp_path / "block", photographs=True)
+    result, folder = aerotri.adjust(flight.block), tmp_path / "block" / "photographs"
+    grid = Grid(200, 200, -300.0, 300.0, 3.0, 3.0)
+    write_surface(tmp_path / "surface.tif", np.full((200, 200), 100.0), np.full((200, 200), 0.2), grid, None, "Z, m")
+    paths = sorted(path for path in folder.iterdir() if path.suffix in (".tif", ".jpg"))
+
+    def notes(out, change):
+        with rasterio.open(paths[3]) as photograph:
+            profile, pixels = photograph.profile, photograph.read()
+        with rasterio.open(paths[3], "w", **profile) as photograph:
+            photograph.write(change(pixels.astype(float)).astype(pixels.dtype))
+        found = aerotri.orthophoto(result, folder, tmp_path / "surface.tif", tmp_path / out, cell=4.0, plots=False)
+        difference = [one["difference"] for one in found.summary["photographs"]]
+        return [note for note in found.summary["notes"] if "colour" in note], difference
+
+    said, even = notes("darker", lambda pixels: 0.7 * pixels)
+    assert said == []
+    stripes = np.sin(np.arange(575) / 20.0) > 0.0
+    said, clouded = notes("clouded", lambda pixels: np.where(stripes, 1.3 * pixels.max() - pixels, pixels))
+    assert len(said) == 1
+    assert said[0].startswith("1 photograph differs in colour")
+    assert f"{paths[3].name} ({100.0 * clouded[3]:.0f} %)" in said[0]
+    assert clouded[3] > 3.0 * max(even)
+
+
 def test_files(made):
     here, _, found = made
     assert json.loads((here / "out" / "ortho.json").read_text(encoding="utf-8")) == found.summary

@@ -310,9 +310,9 @@ def _off(balance: Balance, paths: Sequence[Path]) -> tuple[str, ...]:
         return ()
     differ = "differs" if len(worst) == 1 else "differ"
     return (
-        f"the colours of {counted(len(worst), 'photograph')} {differ} from others of the same ground far more than is "
-        f"usual in this block, by (share of white): {_named(worst, balance.left, paths)}; look for clouds, shadows of "
-        "clouds, snow or a wrong photograph",
+        f"{counted(len(worst), 'photograph')} {differ} in colour from others of the same ground far more than is usual "
+        f"in this block: {_named(worst, balance.left, paths)}, in percent of white; look for clouds, their shadows or "
+        "a wrong photograph",
     )
 
 
