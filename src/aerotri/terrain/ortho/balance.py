@@ -24,8 +24,10 @@ GAIN_SIGMA, OFFSET_SIGMA = 0.3, 0.05
 """By which exposures may differ, and share of white by which haze may [C]."""
 DARKEST, BRIGHTEST = 0.01, 0.98
 """Colours that count, shares of white: others are clipped."""
-LIMIT, ROUNDS = 2.5, 4
-"""Differences beyond this number of robust standard deviations do not count [C]: cars, water, trees; and rounds."""
+LIMIT = 2.5
+"""Differences beyond this number of robust standard deviations do not count [C]: cars, water, trees."""
+ROUNDS, SETTLED = 50, 1e-3
+"""Adjustments of a band at most, and change of the gains with which they end [C]."""
 LEAST_LIMIT = 2.5e-4
 """Share of white that differences may always have [C]: where photographs are free of noise."""
 FEWEST_CELLS = 10
@@ -122,7 +124,10 @@ def _of_band(count: int, pairs: _Pairs) -> tuple[np.ndarray, np.ndarray]:
     for _ in range(ROUNDS):
         difference = np.abs(gain[p.a][p.at] * p.x + offset[p.a][p.at] - gain[p.b][p.at] * p.y - offset[p.b][p.at])
         limit = LIMIT * SIGMA_PER_MAD * float(np.median(difference)) if len(difference) else 0.0
+        before = gain
         gain, offset = _solved(count, p, difference <= max(limit, LEAST_LIMIT))
+        if np.abs(gain - before).max() < SETTLED:
+            break
     return gain, offset
 
 
