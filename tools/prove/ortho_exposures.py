@@ -1,10 +1,11 @@
 """Orthophotos of photographs some of which were given another exposure: does it show in the orthophoto?
 
 The values v of some photographs become f·v + o. Cells of the orthophoto are held against those of the orthophoto from
-unchanged photographs: the step is the median ratio where the changed photographs are shown over that elsewhere. One
-gain of all photographs is free, so 1 is right. Prints Markdown.
+unchanged photographs: the step is the ratio of the mean values where the changed photographs are shown over that
+elsewhere. One gain of all photographs is free, so 1 is right. Prints Markdown.
 
-    aerotri run blocks/drone_site/photographs --gcp blocks/drone_site/gcp_list.txt --out PROJECT
+    aerotri run blocks/drone_site/photographs --out PROJECT --gcp blocks/drone_site/gcp_list.txt \\
+      --control-sigma-m 0.01,0.01,0.02 --check K01 --check K02 --check K03 --boundary blocks/drone_site/pile.geojson
     python tools/prove/ortho_exposures.py PROJECT blocks/drone_site/photographs > tools/results/ortho_exposures.md
 """
 
@@ -94,8 +95,8 @@ def _step(found: Any, plain: Any, changed: np.ndarray) -> str:
     counts = seen & (before > DARKEST) & (before < BRIGHTEST)
     if not (shown & counts).any():
         return ""
-    ratio = value / np.maximum(before, 1.0)
-    return f"{np.median(ratio[shown & counts]) / np.median(ratio[~shown & counts]):.3f}"
+    ratio = [value[part].sum() / before[part].sum() for part in (shown & counts, ~shown & counts)]
+    return f"{ratio[0] / ratio[1]:.3f}"
 
 
 if __name__ == "__main__":
