@@ -97,8 +97,11 @@ def summed_part(parts: Sequence[Part], corrected: bool) -> Part:
     between = Between(sum(b.curvature for b in known), sum(b.variance for b in known)) if known else None
     response = respond(first.calibration, joint.pickets, gradient, corrected)
     unseen = sum(part.unseen for part in parts)
+    # patches are those of the whole surface: one that reaches into two volumes errs in both
+    bridged = None if first.bridged is None else np.sum([part.bridged for part in parts], axis=0)
     return Part(
-        first.calibration, response, between, len(joint.pickets), len(joint.pickets.image), unseen, joint, first.lasting
+        first.calibration, response, between, len(joint.pickets), len(joint.pickets.image), unseen, joint,
+        first.lasting, bridged=bridged,
     )  # fmt: skip
 
 
