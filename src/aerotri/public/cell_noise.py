@@ -38,7 +38,11 @@ def noise_of_dense(dense: DenseSurface, layer: Layer = LAYER) -> CellNoise:
         bridge[place] = np.where(bridged, tile.sigma, np.nan)
     noise, photographs = HeldRaster(sigma, o.grid, None, MATCHING), HeldRaster(count, o.grid, None, COUNT)
     held = HeldRaster(bridge, o.grid, None, SOURCE)
-    bridges = None if ground is None else Bridges(held, lambda *place: np.isfinite(held.read(*place)))
+
+    def is_bridged(row: int, column: int, rows: int, columns: int) -> np.ndarray:
+        return np.isfinite(held.read(row, column, rows, columns))
+
+    bridges = None if ground is None else Bridges(held, is_bridged)
     return CellNoise(noise, 0.0 if length is None else length, photographs, lasting_of_dense(dense), bridges)
 
 
@@ -92,8 +96,8 @@ def noise_of_file(path: Path | None, stack: ExitStack) -> CellNoise:
     total = stack.enter_context(RasterReader(path, band=2))
     whole = None if matching is None else _beside(path, SURFACE, grid, stack, band=2)
     found = None if matching is None else MeasuredGround(source, matching)
-    bridges = Bridges(BridgedGround(source, total, whole, matching), lambda *place: source.read(*place) == BRIDGED)
-    return CellNoise(found, length, count, Lasting(*lasting), bridges)
+    bridge = BridgedGround(source, total, whole, matching)
+    return CellNoise(found, length, count, Lasting(*lasting), Bridges(bridge, bridge.is_bridged))
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +159,10 @@ class BridgedGround:
             both, alone = (one.read(row, column, rows, columns).astype(float) for one in (self.whole, self.matching))
             variance -= filled(both**2 - alone**2)
         return np.sqrt(np.maximum(variance, 0.0))
+
+    def is_bridged(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
+        """(rows, columns) bool."""
+        return self.source.read(row, column, rows, columns) == BRIDGED
 
     def sample(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """(n,) m, bilinear."""

@@ -243,8 +243,8 @@ def _parts(of: str) -> list[Item]:
         Item(
             f"{of}.{BRIDGED}",
             "number",
-            "Part of ground that is bridged below objects: all cells of a bridged patch are taken to err together. Only "
-            "of the ground of a dense surface (dtm.tif of `dsm --ground`).",
+            "Part of ground that is bridged below objects: all cells of a bridged patch are taken to err together. "
+            "Only of the ground of a dense surface (dtm.tif of `dsm --ground`).",
             "m³",
             optional=True,
         ),

@@ -74,7 +74,8 @@ class VolumeSigma:
 
     Parameters
     ----------
-    parts : by the names of `PARTS`, perhaps `MODEL`, `LASTING` and `BRIDGED` too, each alone; interpolation holds the curvature.
+    parts : by the names of `PARTS`, perhaps `MODEL`, `LASTING` and `BRIDGED` too, each alone; interpolation holds the
+        curvature.
     curvature : ground that straight lines between the heights are expected to leave out, m³ and its σ; not in the
         volume, None where not known.
     systematic : what uncorrected image errors add or would add.

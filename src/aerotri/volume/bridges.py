@@ -53,7 +53,9 @@ class Bridges:
         for row in range(0, grid.rows, height):
             some, column = np.nonzero(self.is_bridged(row, 0, min(height, grid.rows - row), grid.columns))
             found[(row + some) // step, column // step] = True
-        return np.asarray(label(found, np.ones((3, 3), bool))[0])
+        numbers = np.zeros(found.shape, np.int32)
+        label(found, np.ones((3, 3), bool), output=numbers)
+        return numbers
 
     def patches_at(self, grid: Grid) -> np.ndarray:
         """(rows, columns) whole, of the cells of another grid; 0 beside the patches."""

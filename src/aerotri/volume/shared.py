@@ -98,7 +98,8 @@ def summed_part(parts: Sequence[Part], corrected: bool) -> Part:
     response = respond(first.calibration, joint.pickets, gradient, corrected)
     unseen = sum(part.unseen for part in parts)
     # patches are those of the whole surface: one that reaches into two volumes errs in both
-    bridged = None if first.bridged is None else np.sum([part.bridged for part in parts], axis=0)
+    each = [part.bridged for part in parts if part.bridged is not None]
+    bridged = np.sum(each, axis=0) if each else None
     return Part(
         first.calibration, response, between, len(joint.pickets), len(joint.pickets.image), unseen, joint,
         first.lasting, bridged=bridged,
