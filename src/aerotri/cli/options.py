@@ -152,6 +152,16 @@ SurfaceLayer = Annotated[
         rich_help_panel=SURFACE,
     ),
 ]
+RunLayer = Annotated[
+    str,
+    typer.Option(
+        "--layer",
+        help="Which surface of the terrain (OUT/dtm, points every few metres) the volume is measured on: dtm, inside "
+        "the boundary all that was measured, beside it the ground alone; or dsm, with objects everywhere. Never the "
+        "dense surface: measure that by aerotri volume OUT/dsm.",
+        rich_help_panel=SURFACE,
+    ),
+]
 BoundarySigma = Annotated[
     float, typer.Option(min=0.0, help="σ of a corner of the boundary, m.", rich_help_panel=SIGMAS)
 ]

@@ -30,8 +30,8 @@ from aerotri.cli.options import (
     PhotographPositions,
     PixelSize,
     ProjectOf,
+    RunLayer,
     Seed,
-    SurfaceLayer,
     SystemOfPhotographs,
     Workers,
     cell_of_surface,
@@ -84,7 +84,7 @@ def run(
     base: Annotated[
         str, typer.Option(help="Base of the volume, as aerotri volume takes it.", rich_help_panel=SURFACE)
     ] = "",
-    layer: SurfaceLayer = RUN_LAYER,
+    layer: RunLayer = RUN_LAYER,
     boundary_from: BoundaryOrigin = SIGMA.boundary_from,
     boundary_sigma: BoundarySigma = SIGMA.boundary_sigma,
     density: DensityOf = None,
