@@ -156,9 +156,9 @@ RunLayer = Annotated[
     str,
     typer.Option(
         "--layer",
-        help="Which surface of the terrain (OUT/dtm, points every few metres) the volume is measured on: dtm, inside "
-        "the boundary all that was measured, beside it the ground alone; or dsm, with objects everywhere. Never the "
-        "dense surface: measure that by aerotri volume OUT/dsm.",
+        help="Which surface of the terrain (OUT/dtm, points every few metres) OUT/volume is measured on: dtm, inside "
+        "the boundary all that was measured, beside it the ground alone; or dsm, with objects everywhere. The volume "
+        "on the dense surface is OUT/dsm_volume, with objects whatever is said here.",
         rich_help_panel=SURFACE,
     ),
 ]
