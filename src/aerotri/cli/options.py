@@ -152,16 +152,6 @@ SurfaceLayer = Annotated[
         rich_help_panel=SURFACE,
     ),
 ]
-RunLayer = Annotated[
-    str,
-    typer.Option(
-        "--layer",
-        help="Which surface of the terrain (OUT/dtm, points every few metres) OUT/volume is measured on: dtm, inside "
-        "the boundary all that was measured, beside it the ground alone; or dsm, with objects everywhere. The volume "
-        "on the dense surface is OUT/dsm_volume, with objects whatever is said here.",
-        rich_help_panel=SURFACE,
-    ),
-]
 BoundarySigma = Annotated[
     float, typer.Option(min=0.0, help="σ of a corner of the boundary, m.", rich_help_panel=SIGMAS)
 ]

@@ -30,8 +30,8 @@ from aerotri.cli.options import (
     PhotographPositions,
     PixelSize,
     ProjectOf,
-    RunLayer,
     Seed,
+    SurfaceLayer,
     SystemOfPhotographs,
     Workers,
     cell_of_surface,
@@ -78,15 +78,16 @@ def run(
     boundary: Annotated[
         str,
         typer.Option(
-            help="Boundary of a volume, measured on the terrain and on the dense surface: GeoPackage, GeoJSON or WKT. "
-            "Without it there is no volume.",
+            help="Boundary of a volume: GeoPackage, GeoJSON or WKT. Without it there is no volume. It is measured on "
+            "the terrain (OUT/dtm, of which --layer chooses the surface), and on the dense surface (OUT/dsm), whatever "
+            "--layer says.",
             rich_help_panel=SURFACE,
         ),
     ] = "",
     base: Annotated[
         str, typer.Option(help="Base of the volume, as aerotri volume takes it.", rich_help_panel=SURFACE)
     ] = "",
-    layer: RunLayer = RUN_LAYER,
+    layer: SurfaceLayer = RUN_LAYER,
     boundary_from: BoundaryOrigin = SIGMA.boundary_from,
     boundary_sigma: BoundarySigma = SIGMA.boundary_sigma,
     density: DensityOf = None,

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aerotri.conventions import in_digits
-from aerotri.volume.bases import Base, PlaneBase, SplineBase, Surface, integral_of_spline, quadrature_of, sampled
+from aerotri.volume.bases import Base, PlaneBase, SplineBase, Surface, integral_of_spline, quadrature_of
 from aerotri.volume.boundary import Boundary
+from aerotri.volume.drawn_edge import boundary_variance
 from aerotri.volume.ground_around import ground_around
 from aerotri.volume.parts import Part
 from aerotri.volume.rectified import LINE, NO_LINE, Line
@@ -28,8 +29,6 @@ from aerotri.volume.shared import (
 
 ALL_THE_SAME = 1.0 - 1e-9
 """Share of the heights of two surfaces that is in both from which they are one surface, but for rounding."""
-ALONG_EDGE = 33
-"""Places along every edge of the boundary."""
 PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")
 MOVES = "the boundary is taken as drawn on the surface: a shift or turn of the whole block moves both"
 MODEL = "model"
@@ -143,7 +142,7 @@ def volume_sigma(
     stated = options.base_sigma * (boundary.area if region is None else region.area)
     ground = stated**2 if below is None else below
     sign = 0 if region is None else region.sign
-    edge = boundary_variance(surface, base, boundary, options.boundary_sigma, sign)
+    edge = boundary_variance(surface, base, boundary, options.boundary_sigma, sign, region)
     notes = _notes(part, base_part, base, below is not None, options)
     beside = _Beside(ground, edge, notes, region.line if region is not None and sign else None)
     return _assembled(part, base_part, beside, options)
@@ -268,31 +267,6 @@ def _model_in_words(part: Part, parts: dict[str, float]) -> str:
         f"{why}: with this model part the adjustment's share of σ is {in_digits(total, 2)} m³ instead of "
         f"{in_digits(noise, 2)} m³"
     )
-
-
-def boundary_variance(surface: Surface, base: Base, boundary: Boundary, sigma: float, sign: int = 0) -> float:
-    """m⁶, from corners of the boundary that are each off by σ in either coordinate, independently.
-
-    sign : 1 of the cut alone, −1 of the fill.
-
-    [D] ∂V/∂corner = ∮ (z − base)·φ·n ds over its two edges, φ falling linearly from 1 to 0, n the outer normal.
-    """
-    if sigma <= 0.0:
-        return 0.0
-    t = np.linspace(0.0, 1.0, ALONG_EDGE)
-    simpson = np.r_[1.0, np.tile([4.0, 2.0], (ALONG_EDGE - 3) // 2), 4.0, 1.0] / (3.0 * (ALONG_EDGE - 1))
-    total = 0.0
-    for ring in boundary.rings:
-        edges = np.diff(ring, axis=0)
-        at = (ring[:-1, None] + t[None, :, None] * edges[:, None]).reshape(-1, 2)
-        d = sampled(surface, at[:, 0], at[:, 1]) - base.heights(at[:, 0], at[:, 1])
-        d = np.maximum(sign * d, 0.0) if sign else d
-        d = np.where(np.isfinite(d), d, 0.0).reshape(len(edges), ALONG_EDGE)
-        normal = np.column_stack([edges[:, 1], -edges[:, 0]])
-        from_start, from_end = d @ (simpson * (1.0 - t)), d @ (simpson * t)
-        by_corner = from_start[:, None] * normal + np.roll(from_end[:, None] * normal, 1, axis=0)
-        total += float(np.sum(by_corner**2))
-    return sigma**2 * total
 
 
 def spline_variance(base: Base, boundary: Boundary, surface: Surface, region: Region | None = None) -> float | None:
