@@ -27,6 +27,8 @@ from aerotri.volume.shared import (
     summed_part,
 )
 
+ALL_THE_SAME = 1.0 - 1e-9
+"""Share of the heights of two surfaces that is in both from which they are one surface, but for rounding."""
 PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")
 MOVES = "the boundary is taken as drawn on the surface: a shift or turn of the whole block moves both"
 MODEL = "model"
@@ -34,6 +36,8 @@ MODEL = "model"
 parameters leave in all photographs of a camera."""
 LASTING = "matching_shared"
 """The part beside these of dense surfaces: errors of the matching that do not average out."""
+BRIDGED = "bridged"
+"""The part beside these of the ground of dense surfaces: errors of what is bridged below objects."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,8 @@ class VolumeSigma:
 
     Parameters
     ----------
-    parts : by the names of `PARTS`, perhaps `MODEL` and `LASTING` too, each alone; interpolation holds the curvature.
+    parts : by the names of `PARTS`, perhaps `MODEL`, `LASTING` and `BRIDGED` too, each alone; interpolation holds the
+        curvature.
     curvature : ground that straight lines between the heights are expected to leave out, m³ and its σ; not in the
         volume, None where not known.
     systematic : what uncorrected image errors add or would add.
@@ -199,11 +204,12 @@ class _Beside:
 def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: SigmaOptions) -> VolumeSigma:
     """All parts together."""
     both, shared, said = [part] if base_part is None else [part, base_part], 0.0, []
-    lasting = sum(one.lasting_variance for one in both)
+    lasting, bridged = sum(one.lasting_variance for one in both), sum(one.bridged_variance for one in both)
     of_side = beside.line is not None
     if base_part is not None and same_adjustment(part, base_part):
         joint, once = difference_part(part, base_part, options.corrected, of_side)
         both, said, lasting = [joint], [_one_adjustment(once)], lasting * (1.0 - once)
+        bridged = 0.0 if once > ALL_THE_SAME else bridged
     elif base_part is not None:
         shared = shared_control_covariance(part, base_part) + shared_camera_covariance(part, base_part)
         said = [shared_in_words(part, base_part)]
@@ -221,6 +227,8 @@ def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: Sig
         said += [_model_in_words(one, parts) for one in both if one.response.model > 0.0]
     if any(one.lasting.sigma_m > 0.0 for one in (part, base_part) if one is not None):
         parts[LASTING] = np.sqrt(lasting)
+    if any(one.bridged is not None for one in (part, base_part) if one is not None):
+        parts[BRIDGED] = np.sqrt(bridged)
     if beside.line is not None:
         parts[LINE] = np.sqrt(beside.line.mean_square)
     first = both[0]
@@ -237,7 +245,7 @@ def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: Sig
 def _one_adjustment(once: float) -> str:
     """What two surfaces of one adjustment share, in words."""
     said = "surface and base come from one adjustment: the errors that both share cancel"
-    if once > 1.0 - 1e-9:
+    if once > ALL_THE_SAME:
         return f"{said}; all heights are the same measurements"
     if once > 0.0:
         said += f", among them those of {in_digits(100.0 * once, 3)} % of the area, which has the same heights in both"
