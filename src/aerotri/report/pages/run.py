@@ -15,7 +15,7 @@ from aerotri.conventions import counted
 from aerotri.report.pages.dense import dense_parts
 from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.pages.ortho import ortho_parts
-from aerotri.report.pages.product import FileText, ProductParts
+from aerotri.report.pages.product import FileText, ProductParts, verdict_in_words
 from aerotri.report.pages.volume import tonnes
 from aerotri.report.quality import printable, two_digits
 from aerotri.results.head import Head
@@ -79,10 +79,21 @@ def run_page(
     adjusted = _read(folder / RESULT / "adjustment.json")
     return template.render(
         source=printable(Path(content["source"]).name or content["source"]),
-        seconds=content["seconds"], steps=steps, verdict=_verdict(adjusted),
+        seconds=content["seconds"], steps=steps, verdict=_verdict(adjusted), doubts=_doubts(done),
         results=_results({name: _read(place / f"{name}.json") for name, place in done.items()}),
         pictures=list(shown.values()), head=page_head(head),
     )  # fmt: skip
+
+
+def _doubts(done: Mapping[str, Path]) -> dict[str, str]:
+    """What is to be known of surface and orthophoto first, and of which of them; the verdict has its own place."""
+    found: dict[str, list[str]] = {}
+    for name, place in done.items():
+        parts, verdict = _parts_of(name, place), verdict_in_words(_read(place / f"{name}.json"))
+        for text in parts.doubts if parts else ():
+            if text not in verdict:
+                found.setdefault(text, []).append(parts.kind)
+    return {text: " and ".join(kinds).capitalize() for text, kinds in found.items()}
 
 
 def _pictures(done: Mapping[str, Path]) -> dict[Path, tuple[str, str, str]]:
