@@ -89,10 +89,12 @@ def _doubts(done: Mapping[str, Path]) -> dict[str, str]:
     """What is to be known of surface and orthophoto first, and of which of them; the verdict has its own place."""
     found: dict[str, list[str]] = {}
     for name, place in done.items():
-        parts, verdict = _parts_of(name, place), verdict_in_words(_read(place / f"{name}.json"))
-        for text in parts.doubts if parts else ():
-            if text not in verdict:
-                found.setdefault(text, []).append(parts.kind)
+        parts = _parts_of(name, place)
+        if parts is None:
+            continue
+        verdict = verdict_in_words(_read(place / f"{name}.json"))
+        for text in (one for one in parts.doubts if one not in verdict):
+            found.setdefault(text, []).append(parts.kind)
     return {text: " and ".join(kinds).capitalize() for text, kinds in found.items()}
 
 
