@@ -187,10 +187,11 @@ def test_doubts_of_the_products_stand_at_the_top(tmp_path, verdict):
     (tmp_path / "result" / "adjustment.json").write_text(json.dumps(content), encoding="utf-8")
     page = run_page({"source": "photographs", "steps": steps, "seconds": 1.0}, tmp_path, Head())
     top = page[: page.index("<h2>Steps</h2>")]
-    for text in ("Dense surface: Heights have a σ of 16 m (median), which is 160 cells.",
-                 "Orthophoto: Positions have a σ of 16 m (median), which is 320 cells.",
-                 "Dense surface and orthophoto: There are no control points"):  # fmt: skip
-        assert top.count(text) == 1
+    texts = ("Dense surface: Heights have a σ of 16 m (median), which is 160 cells.",
+             "Orthophoto: Positions have a σ of 16 m (median), which is 320 cells.",
+             "Dense surface and orthophoto: There are no control points")  # fmt: skip
+    assert [top.count(text) for text in texts] == [1, 1, 1]
+    assert sorted(texts, key=top.index) == list(texts)
     assert "The adjustment is doubtful" not in top
     doubts, said = top.index("To know first:"), top.index('class="verdict"')
     assert (doubts < said) == (verdict == "accepted")

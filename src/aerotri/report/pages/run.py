@@ -86,16 +86,21 @@ def run_page(
 
 
 def _doubts(done: Mapping[str, Path]) -> dict[str, str]:
-    """What is to be known of surface and orthophoto first, and of which of them; the verdict has its own place."""
+    """What is to be known of surface and orthophoto first, and of which of them; the verdict has its own place.
+
+    What their own pages begin with comes before the rest.
+    """
     found: dict[str, list[str]] = {}
+    rank: dict[str, int] = {}
     for name, place in done.items():
         parts = _parts_of(name, place)
         if parts is None:
             continue
         verdict = verdict_in_words(_read(place / f"{name}.json"))
-        for text in (one for one in parts.doubts if one not in verdict):
+        for number, text in enumerate(one for one in parts.doubts if one not in verdict):
             found.setdefault(text, []).append(parts.kind)
-    return {text: " and ".join(kinds).capitalize() for text, kinds in found.items()}
+            rank.setdefault(text, number)
+    return {text: " and ".join(found[text]).capitalize() for text in sorted(found, key=rank.__getitem__)}
 
 
 def _pictures(done: Mapping[str, Path]) -> dict[Path, tuple[str, str, str]]:
