@@ -152,7 +152,7 @@ def test_little_ground_has_the_slope_of_the_filter():
 
 @pytest.fixture(scope="module")
 def bay(tmp_path_factory):
-    """Even ground with a house, a house beside the border, a hole, and a bay of 6 m and a corner without heights."""
+    """Even ground with two houses and a hole; without heights a bay of 6 m that lone matches close, and a corner."""
     row, column = np.mgrid[:SIDE, :SIDE] * CELL
     z = 50.0 + 0.02 * column + 0.03 * row
     here = {
@@ -165,6 +165,8 @@ def bay(tmp_path_factory):
     }
     z[here["house"] | here["house beside"]] += 6.0
     z[here["hole"] | here["frame"] | here["bay"] | here["corner"]] = np.nan
+    by_chance = here["bay"] & (np.abs(column - 10.0) < 0.3) & (row % 0.5 == 0.0)
+    z[by_chance] = 50.0
     found = bare_ground(outcome_of(tmp_path_factory.mktemp("tiles"), z), 18.0)
     source = np.zeros(z.shape, np.uint8)
     for w, tile in found.tiles():
@@ -181,7 +183,7 @@ def test_objects_and_holes_inside_are_bridged(bay):
 def test_nothing_is_bridged_beyond_the_outline(bay):
     z, here, source = bay
     for name in ("frame", "bay", "corner"):
-        assert not source[here[name]].any(), name
+        assert not source[here[name] & ~np.isfinite(z)].any(), name
     assert (source[np.isfinite(z)] != 0).mean() > 0.99
 
 

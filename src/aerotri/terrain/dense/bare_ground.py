@@ -52,6 +52,9 @@ BYTES_OF_CELL = 200
 RADII = (1, 2, 4, 8)
 """Of the discs that are taken out to measure bridges, coarse cells."""
 FEWEST_BRIDGED = 30
+MEASURED_SHARE = 0.5
+"""Of the fine cells of a coarse one from which the way from outside ends there; chosen [C]: lone matches by chance on
+water or in leaves do not close a bay."""
 MEASURED, BRIDGED = 1, 2
 """Where a height of the ground comes from; 0 where there is none."""
 
@@ -148,9 +151,9 @@ def bare_ground(outcome: DenseOutcome, widest: float) -> BareGround:
         BYTES_OF_CELL * coarse.rows * coarse.columns, f"the ground of {coarse.rows} × {coarse.columns} cells",
         "give an --area, one part of the block after the other",
     )  # fmt: skip
-    lowest = _lowest(o, coarse)
+    lowest, share = _lowest(o, coarse)
     # a fine cell without a height may be outside in a coarse cell that has heights, so the neighbours count as well
-    beyond = np.asarray(binary_dilation(outside(np.isfinite(lowest)), np.ones((3, 3), bool)), bool)
+    beyond = np.asarray(binary_dilation(outside(share >= MEASURED_SHARE), np.ones((3, 3), bool)), bool)
     lowest = _without_low_errors(lowest, coarse.cell_x)
     kept = ground_cells(lowest, coarse.cell_x, widest=widest)
     lowest = _filled(np.where(kept, lowest, np.nan))
@@ -248,14 +251,17 @@ def _disc(radius: int) -> np.ndarray:
     return x * x + y * y <= radius * radius
 
 
-def _lowest(o: DenseOutcome, coarse: Grid) -> np.ndarray:
-    """(rows, columns) m, the lowest height in every coarse cell, NaN where there is none."""
+def _lowest(o: DenseOutcome, coarse: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, columns) m, the lowest height in every coarse cell, NaN where there is none; share of it with heights."""
+    count = np.zeros((coarse.rows, coarse.columns))
     out = np.full((coarse.rows, coarse.columns), np.inf)
     step = round(coarse.cell_x / o.grid.cell_x)
     for window, tile in o.files.read_all(list(o.windows)):
         row, column = np.nonzero(np.isfinite(tile.z))
-        np.minimum.at(out, ((window.row + row) // step, (window.column + column) // step), tile.z[row, column])
-    return np.where(np.isfinite(out), out, np.nan)
+        at = (window.row + row) // step, (window.column + column) // step
+        np.minimum.at(out, at, tile.z[row, column])
+        np.add.at(count, at, 1.0)
+    return np.where(np.isfinite(out), out, np.nan), count / step**2
 
 
 def _without_low_errors(z: np.ndarray, cell: float) -> np.ndarray:
