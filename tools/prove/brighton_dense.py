@@ -185,8 +185,8 @@ def main() -> None:
     s = dense.summary
     print(
         f"The surface states a σ of Z of {s['sigma_Z_m']['median']:.1f} m (median); its GSD is "
-        f"{100.0 * s['gsd_m']:.2f} cm, its cells have {100.0 * s['cell_m']:.2f} cm, those of the cloud "
-        f"{200.0 * GSD_M:.2f} cm.\n"
+        f"{100.0 * s['gsd_m']:.2f} cm, the cloud is taken in cells of {200.0 * GSD_M:.2f} cm, "
+        f"ours are {100.0 * s['cell_m']:.2f} cm.\n"
     )
     print(
         f"After the alignment the adjustment brings {noise / GSD_M:.2f} GSD by noise and {left / GSD_M:.2f} GSD by "
