@@ -135,6 +135,22 @@ def test_the_table_and_the_page(place, tmp_path):
     assert "mass of" in page
 
 
+def test_polygons_drawn_side_by_side_that_overlap_by_slivers_count_one_by_one(place):
+    """A tenth of a millimetre along the side of two outlines that were drawn by hand."""
+    left, bottom, right, top = place[1]["A"].bounds
+    middle = 0.5 * (left + right)
+    west, east = shapely.box(left, bottom, middle + 1e-4, top), shapely.box(middle, bottom, right, top)
+    found = aerotri.volume(place[0] / "dsm", {"west": west, "east": east}, base=100.0)
+    assert [one["name"] for one in found.summary["piles"]] == ["west", "east"]
+    assert any(f"overlap by {(top - bottom) * 1e-4:.4g} m²" in text for text in found.warnings)
+    whole = aerotri.volume(place[0] / "dsm", shapely.box(left, bottom, right, top), base=100.0)
+    assert found.net == pytest.approx(whole.net, rel=1e-4)
+    # more than a thousandth of the smaller one is no sliver
+    wide = shapely.box(left, bottom, middle + 2e-3 * (right - left), top)
+    together = aerotri.volume(place[0] / "dsm", {"west": wide, "east": east}, base=100.0)
+    assert together.summary["piles"] == []
+
+
 def test_polygons_that_overlap_count_together(place):
     polygon = place[1]["A"]
     found = aerotri.volume(place[0] / "dsm", {"one": polygon, "two": polygon.buffer(-10.0)}, base=100.0)

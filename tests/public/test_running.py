@@ -58,7 +58,7 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
         boundary_from="product", density=1.8, density_sigma=0.05,
         further={"tie_points": {"features": 2000}, "volume": {"plots": False}},
     )  # fmt: skip
-    tie, adjust, terrain, volume, dense, ortho = fakes.called
+    tie, adjust, terrain, volume, dense, ortho, of_dense = fakes.called
     assert tie[1] == (str(photographs),)
     assert (tie[2]["control"], tie[2]["features"], tie[2]["seed"]) == ("gcp_list.txt", 2000, 4)
     assert adjust == ("adjust", (str(out / "block"), str(out / "result")), {
@@ -90,7 +90,14 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
     assert lines[5] == ["dsm", str(out / "result"), str(photographs), "--out", str(out / "dsm")]
     assert lines[6] == ["ortho", str(out / "result"), str(photographs), str(out / "dsm"), "--out", str(out / "ortho")]
     assert project.block == "adjusted"
-    assert None not in (project.volume, project.dense, project.orthophoto)
+    # the same on the dense surface, which has objects always
+    assert of_dense[1] == (str(out / "dsm"),)
+    assert of_dense[2] == {name: value for name, value in volume[2].items() if name != "layer"}
+    assert lines[7] == [
+        *("volume", str(out / "dsm"), "--adjustment", str(out / "result"), "--out", str(out / "dsm_volume")),
+        *(word for word in lines[4][6:] if word not in ("--layer", "dtm")),
+    ]
+    assert None not in (project.volume, project.dense, project.orthophoto, project.dense_volume)
 
 
 def test_the_layer_of_the_volume_is_told(fakes, photographs, tmp_path):
@@ -164,12 +171,15 @@ def test_a_step_ends_only_what_is_built_on_it(fakes, photographs, tmp_path):
     out = tmp_path / "out"
     fakes.ends["terrain"] = InputError("no ground", "fly lower")
     aerotri.run(photographs, out, boundary="pile.gpkg")
-    assert fakes.verbs == ["tie_points", "adjust", "terrain", "dense", "orthophoto"]
+    assert fakes.verbs == ["tie_points", "adjust", "terrain", "dense", "orthophoto", "volume"]
     assert ends_of(out)["volume"] == ("left out", "dtm is missing")
+    assert ends_of(out)["dsm_volume"] == ("done", "")
     del fakes.ends["terrain"]
     fakes.ends["dense"] = InputError("no texture", "fly lower")
-    aerotri.run(photographs, out, boundary="pile.gpkg")
-    assert (ends_of(out)["volume"][0], ends_of(out)["ortho"]) == ("done", ("left out", "dsm is missing"))
+    project = aerotri.run(photographs, out, boundary="pile.gpkg")
+    ends = {step.folder: (step.status, step.reason) for step in project.steps}
+    assert ends["volume"] == ("done", "")
+    assert ends["ortho"] == ends["dsm_volume"] == ("left out", "dsm is missing")
 
 
 def test_names_cannot_run_anything(fakes, tmp_path):

@@ -80,6 +80,8 @@ def test_errors_that_do_not_average_out_count_in_the_bias(tmp_path, control):
     assert low < np.sum(np.square(z)) < high
     assert aerotri.compare(raised(control, 0.1), control).matching_shared == 0.0
     assert aerotri.compare(tmp_path / "dsm.tif", control, align="shift").matching_shared == 0.0
+    # the folder stands for the surface in it
+    assert aerotri.compare(tmp_path, control).matching_shared == found.matching_shared
 
 
 def test_a_known_difference(control):

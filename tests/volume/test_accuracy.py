@@ -11,9 +11,9 @@ from scipy.spatial import KDTree
 from scipy.stats import chi2
 
 from aerotri.rasters.grids import Grid
-from aerotri.volume.accuracy import boundary_variance
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import boundary_of
+from aerotri.volume.drawn_edge import boundary_variance
 from aerotri.volume.functionals import tin_volume, triangulated
 from aerotri.volume.roughness import (
     Roughness,

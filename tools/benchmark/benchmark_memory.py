@@ -152,7 +152,7 @@ def _extent(folder: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     points = aerotri.open_result(folder / "result").points
     xyz = np.column_stack([points[name] for name in "XYZ"])
-    return np.median(xyz, axis=0), xyz.min(axis=0), xyz.max(axis=0)
+    return np.nanmedian(xyz, axis=0), np.nanmin(xyz, axis=0), np.nanmax(xyz, axis=0)
 
 
 def _write_surface(path: Path, height: float, low: np.ndarray, high: np.ndarray) -> None:

@@ -22,10 +22,11 @@ import numpy as np
 import shapely
 from scipy.stats import chi2
 
-from aerotri.volume.accuracy import SideSigma, boundary_variance
+from aerotri.volume.accuracy import SideSigma
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import Boundary, boundary_of
 from aerotri.volume.counted import Counted
+from aerotri.volume.drawn_edge import boundary_variance
 from aerotri.volume.functionals import triangulated
 from aerotri.volume.parts import Part, part_of_pickets
 from aerotri.volume.pickets import pickets_where_seen

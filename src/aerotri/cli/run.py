@@ -52,7 +52,8 @@ def run(
     out: Annotated[
         Path,
         typer.Option(
-            help="Folder to write: block, result, dtm, volume, dsm, ortho, and one report.", rich_help_panel=OUTPUT
+            help="Folder to write: block, result, dtm, volume, dsm, ortho, dsm_volume, and one report.",
+            rich_help_panel=OUTPUT,
         ),
     ],
     gcp: MarkedControl = "",
@@ -77,7 +78,9 @@ def run(
     boundary: Annotated[
         str,
         typer.Option(
-            help="Boundary of a volume: GeoPackage, GeoJSON or WKT. Without it there is no volume.",
+            help="Boundary of a volume: GeoPackage, GeoJSON or WKT. Without it there is no volume. It is measured on "
+            "the terrain (OUT/dtm, of which --layer chooses the surface), and on the dense surface (OUT/dsm), whatever "
+            "--layer says.",
             rich_help_panel=SURFACE,
         ),
     ] = "",

@@ -24,8 +24,10 @@ if TYPE_CHECKING:
     from aerotri.public.surfaces import SurfaceLike
     from aerotri.rasters.grids import Grid
     from aerotri.terrain.surface import Surface as Heights
+    from aerotri.volume.bridges import Bridges
+    from aerotri.volume.cell_noise import CellNoise
     from aerotri.volume.change.adjusted import AdjustedPair
-    from aerotri.volume.change.compute import Epoch
+    from aerotri.volume.change.compute import BridgedCells, Epoch
 
 Epochs = tuple[MeasuredSurface, MeasuredSurface]
 BYTES_OF_CELL = 280
@@ -267,7 +269,8 @@ def epoch_of(
     heights = given.surface.heights
     _refuse_no_sigma(given, heights)
     total = _on(heights, heights.sigma, grid)
-    own, used, said = _own_noise(given, total, grid, stack)
+    stated = given.noise(stack)
+    own, used, said = _own_noise(given, total, grid, stated)
     adjustment = np.zeros_like(total)
     if own is None:
         own = total
@@ -277,7 +280,17 @@ def epoch_of(
         adjustment = np.sqrt(np.maximum(total**2 - own**2, 0.0))
     used = used if length is None else length
     sharing = cells_sharing(used, grid.cell_x * grid.cell_y)
-    return Epoch(_on(heights, heights.z, grid), own, adjustment, sharing, given.noise(stack).lasting), said
+    bridge = None if stated.bridges is None else _bridged(heights, stated.bridges, grid)
+    return Epoch(_on(heights, heights.z, grid), own, adjustment, sharing, stated.lasting, bridge), said
+
+
+def _bridged(heights: Heights, bridges: Bridges, grid: Grid) -> BridgedCells:
+    """What of the cells of a change is bridged below objects."""
+    from aerotri.volume.bridges import sigma_of_bridges
+    from aerotri.volume.change.compute import BridgedCells
+
+    sigma = sigma_of_bridges(bridges, (0, 0, heights.grid.rows, heights.grid.columns))
+    return BridgedCells(np.nan_to_num(_on(heights, sigma, grid)), bridges.patches_at(grid))
 
 
 def _refuse_no_sigma(given: MeasuredSurface, heights: Heights) -> None:
@@ -297,7 +310,7 @@ def _refuse_no_sigma(given: MeasuredSurface, heights: Heights) -> None:
 
 
 def _own_noise(
-    given: MeasuredSurface, total: np.ndarray, grid: Grid, stack: ExitStack
+    given: MeasuredSurface, total: np.ndarray, grid: Grid, noise: CellNoise
 ) -> tuple[np.ndarray | None, float, str]:
     """σ of the cells without what the adjustment adds, (rows, columns) m, None where it is not known apart.
 
@@ -306,11 +319,13 @@ def _own_noise(
     Besides: m, side of the square whose cells have one noise; a sentence where σ is not known apart.
     """
     from aerotri.public.terrain_noise import noise_of_terrain
+    from aerotri.volume.bridges import sigma_of_bridges
 
-    heights, noise = given.surface.heights, given.noise(stack)
+    heights = given.surface.heights
     if noise.sigma is not None:
-        matching = noise.sigma.read(0, 0, heights.grid.rows, heights.grid.columns).astype(float)
-        return _on(heights, matching, grid), noise.length_m, ""
+        place = (0, 0, heights.grid.rows, heights.grid.columns)
+        own = np.hypot(noise.sigma.read(*place).astype(float), sigma_of_bridges(noise.bridges, place))
+        return _on(heights, own, grid), noise.length_m, ""
     pickets = noise_of_terrain(given)
     if pickets is not None and np.isfinite(total).any():
         found = pickets.sigma(grid)

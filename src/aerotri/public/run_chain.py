@@ -173,17 +173,25 @@ class RunChain:
         return found
 
     def _volume(self, folder: Path) -> MeasuredVolume:
+        found = self._measured(DTM, folder, "volume")
+        self._project.volume = found
+        return found
+
+    def _measured(self, surface: str, folder: Path, verb: Verb) -> MeasuredVolume:
+        """The volume on the surface in a folder of the run."""
         from aerotri.public.folders import refuse_foreign_folder
         from aerotri.public.volume import volume
         from aerotri.public.volume_result import RECORD as VOLUME_RECORD
 
-        (settings, plots), place = self._given("volume"), self._project.folder
+        (settings, plots), place = self._given(verb), self._project.folder
         refuse_foreign_folder(folder, VOLUME_RECORD)
-        found = volume(
-            place / DTM, adjustment=place / RESULT, progress=self._progress, **settings
-        )  # fmt: skip
+        found = volume(place / surface, adjustment=place / RESULT, progress=self._progress, **settings)
         found.save(folder, plots)
-        self._project.volume = found
+        return found
+
+    def _dense_volume(self, folder: Path) -> MeasuredVolume:
+        found = self._measured(DSM, folder, "dense_volume")
+        self._project.dense_volume = found
         return found
 
     def _dense(self, folder: Path) -> DenseSurface:

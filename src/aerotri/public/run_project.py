@@ -35,6 +35,7 @@ class Project:
     source : what it began with.
     steps : each with how it ended.
     tied : the photographs tied. adjustment : also where it was rejected. surface : the terrain. volume : over it.
+    dense_volume : over the dense surface.
     dense : the surface of all that stands on the ground. orthophoto : over it.
     accuracy : by the check points, None without them.
     seconds : that it took. computed : when it began.
@@ -49,6 +50,7 @@ class Project:
     surface: TerrainModel | None = None
     volume: MeasuredVolume | None = None
     dense: DenseSurface | None = None
+    dense_volume: MeasuredVolume | None = None
     orthophoto: Orthophoto | None = None
     accuracy: Accuracy | None = None
     seconds: float = 0.0
@@ -100,6 +102,6 @@ class Project:
             f"<td>{escape(step.reason or str(self.folder / step.folder))}</td></tr>"
             for step in self.steps
         )
-        made = (self.adjustment, self.surface, self.volume, self.dense, self.orthophoto)
+        made = (self.adjustment, self.surface, self.volume, self.dense, self.orthophoto, self.dense_volume)
         shown = [one.html() for one in made if one is not None]
         return f"<div><table><caption>{escape(self.verdict)}</caption>{rows}</table>{''.join(shown)}</div>"

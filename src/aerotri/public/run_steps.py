@@ -13,10 +13,11 @@ from aerotri.volume.settings import LAYER
 
 RECORD, REPORT = "run.json", "report.html"
 BLOCK, RESULT, ACCURACY, DTM, VOLUME, DSM, ORTHO = "block", "result", "accuracy", "dtm", "volume", "dsm", "ortho"
-Verb = Literal["tie_points", "adjust", "accuracy", "terrain", "volume", "dense", "orthophoto"]
+DENSE_VOLUME = "dsm_volume"
+Verb = Literal["tie_points", "adjust", "accuracy", "terrain", "volume", "dense", "orthophoto", "dense_volume"]
 BUILT_ON: Mapping[Verb, Verb] = {
     "adjust": "tie_points", "accuracy": "adjust", "terrain": "adjust", "volume": "terrain", "dense": "adjust",
-    "orthophoto": "dense",
+    "orthophoto": "dense", "dense_volume": "dense",
 }  # fmt: skip
 """The step that each takes up."""
 OPTIONS = {"control": "gcp"}
@@ -89,6 +90,9 @@ def steps_of(
         "dense": Step("dsm", DSM, "Dense surface", ("dsm", result, str(source), "--out", dsm)),
         "orthophoto": Step("ortho", ORTHO, "Orthophoto", ("ortho", result, str(source), dsm, "--out", ortho)),
     }
+    if dense and not is_block(source) and settings["volume"].get("boundary"):
+        given = ("volume", dsm, "--adjustment", result, "--out", str(out / DENSE_VOLUME))
+        steps["dense_volume"] = Step("volume", DENSE_VOLUME, "Volume on the dense surface", given)
     if is_block(source):
         del steps["tie_points"]
     without: dict[Verb, str] = {}

@@ -88,16 +88,18 @@ def run(
     parameters : additional parameters of the adjustment, see `aerotri.adjust`; those of the block where None, of
         photographs 'auto'.
     interval : m between the points of the terrain (pickets); from the GSD and the relief where None.
-    boundary : of a volume, see `aerotri.volume`; no volume where None.
+    boundary : of a volume, see `aerotri.volume`; no volume where None. It is measured on the terrain and, if `dense`,
+        on the dense surface too.
     base : of the volume, see `aerotri.volume`.
-    layer : surface of the volume: 'dtm', within the boundary all that was measured, beside it the ground without
-        objects; or 'dsm', with objects everywhere.
+    layer : surface of the terrain that `volume` is measured on: 'dtm', within the boundary all that was measured,
+        beside it the ground without objects; or 'dsm', with objects everywhere. `dense_volume` is measured on the
+        dense surface, with objects.
     boundary_from : 'survey', where the boundary is known in space, or 'product', where it was drawn on the surface or
         the orthophoto of this run, see `aerotri.volume`.
     boundary_sigma : m, σ of either coordinate of a corner of the boundary.
     density : t/m³, of all that is inside the boundary: gives tonnes.
     density_sigma : t/m³, its σ, common to all piles.
-    dense : the dense surface and the orthophoto as well.
+    dense : the dense surface, the orthophoto and, with a boundary, the volume on the dense surface as well.
     resolution : m, cell of the dense surface; two pixels on the ground where None.
     plots : draw the plots of the adjustment.
     go_on : go on after an adjustment that was rejected.
@@ -153,7 +155,10 @@ def run(
         "orthophoto": {"executor": elsewhere}, "accuracy": {},
     }  # fmt: skip
     for verb, more in (further or {}).items():
-        settings[verb] |= more
+        settings[verb] = {**settings.get(verb, {}), **more}
+    # of a dense surface there is the one with objects alone
+    of_dense = {name: value for name, value in settings["volume"].items() if name != "layer"}
+    settings["dense_volume"] = of_dense | settings.get("dense_volume", {})
     place = Path(source)
     target = Path(f"{place.resolve().name}_project" if out is None else out)
     refuse_no_folder(target)

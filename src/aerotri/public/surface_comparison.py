@@ -301,11 +301,15 @@ def _name(surface: SurfaceLike) -> str:
 
 
 def _lasting_of(surface: SurfaceLike) -> Lasting:
-    """Errors that do not average out, of a dense surface in memory or a file of one; none of others."""
+    """Errors that do not average out, of a dense surface in memory, a file or the folder of one; none of others."""
+    from aerotri.formats.files.heights import file_of_surface
     from aerotri.public.cell_noise import lasting_of_dense, lasting_of_file
     from aerotri.public.dense import DenseSurface
 
-    return lasting_of_dense(surface) if isinstance(surface, DenseSurface) else lasting_of_file(_file(surface))
+    if isinstance(surface, DenseSurface):
+        return lasting_of_dense(surface)
+    path = _file(surface)
+    return lasting_of_file(None if path is None else file_of_surface(path))
 
 
 def _sources(test: SurfaceLike, control: SurfaceLike, stack: ExitStack) -> tuple[HeightSource, HeightSource]:

@@ -272,7 +272,7 @@ def as_surface(surface: SurfaceLike, layer: Layer = LAYER) -> Surface:
     from aerotri.public.dense import DenseSurface
 
     if isinstance(surface, DenseSurface):
-        return surface.surface
+        return surface.dtm if layer == "dtm" else surface.surface
     return surface.dsm if layer == "dsm" else surface.dtm
 
 

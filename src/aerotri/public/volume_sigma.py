@@ -111,7 +111,7 @@ class MeasuredSurface:
         from aerotri.public.cell_noise import noise_of_dense, noise_of_file
 
         if isinstance(self.given, DenseSurface):
-            return noise_of_dense(self.given)
+            return noise_of_dense(self.given, self.layer)
         return noise_of_file(self.surface.path, stack)
 
     def is_same(self, other: MeasuredSurface) -> bool:

@@ -29,6 +29,8 @@ PART_WORDS = {
     "none, or where the adjustments are not given.",
     "matching_shared": "Matching errors that neighbouring cells of dense surfaces share and that do not average out; 0 "
     "of other surfaces.",
+    "bridged": "Ground that is bridged below objects (dtm.tif of `dsm --ground`): all cells of a bridged patch are "
+    "taken to err together; 0 of other surfaces.",
 }
 
 

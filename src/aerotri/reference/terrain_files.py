@@ -6,7 +6,7 @@ from aerotri.reference.head import ADJUSTED, ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.image_error_files import MODELS
 from aerotri.reference.records import DescribedFile, Item, of_axes
 from aerotri.terrain.picket_status import TEXTS, PicketStatus
-from aerotri.volume.accuracy import LASTING, MODEL, PARTS
+from aerotri.volume.accuracy import BRIDGED, LASTING, MODEL, PARTS
 from aerotri.volume.settings import METHODS
 
 DTM, DSM, COMPARE, VOLUME = (f"folder of {name}" for name in ("dtm", "dsm", "compare", "volume"))
@@ -249,6 +249,14 @@ def _parts(of: str) -> list[Item]:
             "number",
             "Part of matching errors that neighbouring cells of a dense surface share, so that they do not average "
             "out. Only of dense surfaces.",
+            "m³",
+            optional=True,
+        ),
+        Item(
+            f"{of}.{BRIDGED}",
+            "number",
+            "Part of ground that is bridged below objects: all cells of a bridged patch are taken to err together. "
+            "Only of the ground of a dense surface (dtm.tif of `dsm --ground`).",
             "m³",
             optional=True,
         ),

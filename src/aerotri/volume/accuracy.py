@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aerotri.conventions import in_digits
-from aerotri.volume.bases import Base, PlaneBase, SplineBase, Surface, integral_of_spline, quadrature_of, sampled
+from aerotri.volume.bases import Base, PlaneBase, SplineBase, Surface, integral_of_spline, quadrature_of
 from aerotri.volume.boundary import Boundary
+from aerotri.volume.drawn_edge import boundary_variance
 from aerotri.volume.ground_around import ground_around
 from aerotri.volume.parts import Part
 from aerotri.volume.rectified import LINE, NO_LINE, Line
@@ -26,8 +27,8 @@ from aerotri.volume.shared import (
     summed_part,
 )
 
-ALONG_EDGE = 33
-"""Places along every edge of the boundary."""
+ALL_THE_SAME = 1.0 - 1e-9
+"""Share of the heights of two surfaces that is in both from which they are one surface, but for rounding."""
 PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")
 MOVES = "the boundary is taken as drawn on the surface: a shift or turn of the whole block moves both"
 MODEL = "model"
@@ -35,6 +36,8 @@ MODEL = "model"
 parameters leave in all photographs of a camera."""
 LASTING = "matching_shared"
 """The part beside these of dense surfaces: errors of the matching that do not average out."""
+BRIDGED = "bridged"
+"""The part beside these of the ground of dense surfaces: errors of what is bridged below objects."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,8 @@ class VolumeSigma:
 
     Parameters
     ----------
-    parts : by the names of `PARTS`, perhaps `MODEL` and `LASTING` too, each alone; interpolation holds the curvature.
+    parts : by the names of `PARTS`, perhaps `MODEL`, `LASTING` and `BRIDGED` too, each alone; interpolation holds the
+        curvature.
     curvature : ground that straight lines between the heights are expected to leave out, m³ and its σ; not in the
         volume, None where not known.
     systematic : what uncorrected image errors add or would add.
@@ -138,7 +142,7 @@ def volume_sigma(
     stated = options.base_sigma * (boundary.area if region is None else region.area)
     ground = stated**2 if below is None else below
     sign = 0 if region is None else region.sign
-    edge = boundary_variance(surface, base, boundary, options.boundary_sigma, sign)
+    edge = boundary_variance(surface, base, boundary, options.boundary_sigma, sign, region)
     notes = _notes(part, base_part, base, below is not None, options)
     beside = _Beside(ground, edge, notes, region.line if region is not None and sign else None)
     return _assembled(part, base_part, beside, options)
@@ -200,11 +204,12 @@ class _Beside:
 def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: SigmaOptions) -> VolumeSigma:
     """All parts together."""
     both, shared, said = [part] if base_part is None else [part, base_part], 0.0, []
-    lasting = sum(one.lasting_variance for one in both)
+    lasting, bridged = sum(one.lasting_variance for one in both), sum(one.bridged_variance for one in both)
     of_side = beside.line is not None
     if base_part is not None and same_adjustment(part, base_part):
         joint, once = difference_part(part, base_part, options.corrected, of_side)
         both, said, lasting = [joint], [_one_adjustment(once)], lasting * (1.0 - once)
+        bridged = 0.0 if once > ALL_THE_SAME else bridged
     elif base_part is not None:
         shared = shared_control_covariance(part, base_part) + shared_camera_covariance(part, base_part)
         said = [shared_in_words(part, base_part)]
@@ -222,6 +227,8 @@ def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: Sig
         said += [_model_in_words(one, parts) for one in both if one.response.model > 0.0]
     if any(one.lasting.sigma_m > 0.0 for one in (part, base_part) if one is not None):
         parts[LASTING] = np.sqrt(lasting)
+    if any(one.bridged is not None for one in (part, base_part) if one is not None):
+        parts[BRIDGED] = np.sqrt(bridged)
     if beside.line is not None:
         parts[LINE] = np.sqrt(beside.line.mean_square)
     first = both[0]
@@ -238,7 +245,7 @@ def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: Sig
 def _one_adjustment(once: float) -> str:
     """What two surfaces of one adjustment share, in words."""
     said = "surface and base come from one adjustment: the errors that both share cancel"
-    if once > 1.0 - 1e-9:
+    if once > ALL_THE_SAME:
         return f"{said}; all heights are the same measurements"
     if once > 0.0:
         said += f", among them those of {in_digits(100.0 * once, 3)} % of the area, which has the same heights in both"
@@ -260,31 +267,6 @@ def _model_in_words(part: Part, parts: dict[str, float]) -> str:
         f"{why}: with this model part the adjustment's share of σ is {in_digits(total, 2)} m³ instead of "
         f"{in_digits(noise, 2)} m³"
     )
-
-
-def boundary_variance(surface: Surface, base: Base, boundary: Boundary, sigma: float, sign: int = 0) -> float:
-    """m⁶, from corners of the boundary that are each off by σ in either coordinate, independently.
-
-    sign : 1 of the cut alone, −1 of the fill.
-
-    [D] ∂V/∂corner = ∮ (z − base)·φ·n ds over its two edges, φ falling linearly from 1 to 0, n the outer normal.
-    """
-    if sigma <= 0.0:
-        return 0.0
-    t = np.linspace(0.0, 1.0, ALONG_EDGE)
-    simpson = np.r_[1.0, np.tile([4.0, 2.0], (ALONG_EDGE - 3) // 2), 4.0, 1.0] / (3.0 * (ALONG_EDGE - 1))
-    total = 0.0
-    for ring in boundary.rings:
-        edges = np.diff(ring, axis=0)
-        at = (ring[:-1, None] + t[None, :, None] * edges[:, None]).reshape(-1, 2)
-        d = sampled(surface, at[:, 0], at[:, 1]) - base.heights(at[:, 0], at[:, 1])
-        d = np.maximum(sign * d, 0.0) if sign else d
-        d = np.where(np.isfinite(d), d, 0.0).reshape(len(edges), ALONG_EDGE)
-        normal = np.column_stack([edges[:, 1], -edges[:, 0]])
-        from_start, from_end = d @ (simpson * (1.0 - t)), d @ (simpson * t)
-        by_corner = from_start[:, None] * normal + np.roll(from_end[:, None] * normal, 1, axis=0)
-        total += float(np.sum(by_corner**2))
-    return sigma**2 * total
 
 
 def spline_variance(base: Base, boundary: Boundary, surface: Surface, region: Region | None = None) -> float | None:

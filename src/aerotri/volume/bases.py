@@ -270,6 +270,29 @@ def integral_of_spline(base: SplineBase, places: np.ndarray, weight: np.ndarray)
     return np.linalg.lstsq(system.T, terms, rcond=1e-14)[0][: len(at)]
 
 
+def by_places_of_kernels(base: SplineBase, places: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """(k, 2) m², ∫ of the spline over places (q, 2) with weights (q,) m² by the places it goes through, of one height.
+
+    [D] With coefficients c, and e(p) = ∫φ(p) less what the weights of the integral make of φ there, which is 0 at all
+    places: c·∇e. That heights change and the spline is sloped where a place moves is not in it.
+    """
+    middle, size, at, system = _spline_system(base.xy)
+    few = len(at)
+    right = np.concatenate([base.z - base.z.mean(), np.zeros(3)])
+    coefficients = np.linalg.lstsq(system, right, rcond=1e-14)[0][:few]
+    within = (places - middle) / size
+    weights = np.linalg.lstsq(system.T, weight @ _spline_terms(within, at), rcond=1e-14)[0]
+    slopes = _pull(at, within, weight) - _pull(at, at, weights[:few]) - weights[few + 1 :]
+    return coefficients[:, None] * slopes / size
+
+
+def _pull(at: np.ndarray, others: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """(k, 2), Σ weight·∇(−ρ) at places (k, 2), ρ to others (n, 2); nothing of one that is there itself."""
+    gap = at[:, None] - others[None]
+    length = np.linalg.norm(gap, axis=2)
+    return -np.einsum("knc,kn->kc", gap, weight / np.where(length > 0.0, length, np.inf))
+
+
 def _spline_system(xy: np.ndarray) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
     """Middle and size of places (k, 2), these in their units, and the system (k + 3, k + 3) of the spline."""
     middle = xy.mean(axis=0)

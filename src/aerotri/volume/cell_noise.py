@@ -10,6 +10,7 @@ from aerotri.deformation.orientation import calibrated_orientation
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume.bases import Surface
+from aerotri.volume.bridges import Bridges
 from aerotri.volume.functionals import Functional
 from aerotri.volume.lasting import NO_LASTING, Lasting
 from aerotri.volume.pickets import Pickets
@@ -25,13 +26,15 @@ class CellNoise:
 
     length_m : side of the square whose cells have one noise; 0 where neighbours share none.
     photographs : number that measured a cell, on the cells of the surface; None where not known.
-    lasting : errors that do not average out.
+    lasting : errors that do not average out. bridges : cells bridged below objects, whose σ from matching is 0; None
+    where there are none.
     """
 
     sigma: Surface | None = None
     length_m: float = 0.0
     photographs: Surface | None = None
     lasting: Lasting = NO_LASTING
+    bridges: Bridges | None = None
 
 
 NO_NOISE = CellNoise()

@@ -16,6 +16,7 @@ from aerotri.rasters.grids import Grid
 from aerotri.terrain.tin import corners_in_plan
 from aerotri.volume.bases import Base, Nodes, Surface, nodes_of
 from aerotri.volume.boundary import Boundary
+from aerotri.volume.bridges import Bridges, sigma_of_bridges
 from aerotri.volume.counted import Counted
 from aerotri.volume.drawn import DRAWN_MARGIN, drawn_cells, drawn_in_plan, slope_of_nodes, slopes_of_cells
 from aerotri.volume.sums import cells_within, windows
@@ -36,17 +37,19 @@ class Functional:
     xyz : (k, 3) m. gradient : (k, 3) ∂V/∂(X, Y, Z).
     noise_share : (k,) Σw²/(Σw)² of the heights that a place stands for, 1 where it is one.
     noise : (k,) Σw²·σ² of their own noise, where its σ is known; None where not.
+    bridged : (n,) m³, of every bridged patch what its error makes; None where nothing is bridged.
     """
 
     xyz: np.ndarray
     gradient: np.ndarray
     noise_share: np.ndarray
     noise: np.ndarray | None = None
+    bridged: np.ndarray | None = None
 
     def take(self, rows: np.ndarray) -> Functional:
         """At some of the places."""
         noise = None if self.noise is None else self.noise[rows]
-        return Functional(self.xyz[rows], self.gradient[rows], self.noise_share[rows], noise)
+        return Functional(self.xyz[rows], self.gradient[rows], self.noise_share[rows], noise, self.bridged)
 
 
 def triangulated(xyz: np.ndarray) -> np.ndarray:
@@ -130,6 +133,7 @@ def cell_volume(
     sigma: Surface | None = None,
     drawn: bool = False,
     counted: Counted | None = None,
+    bridges: Bridges | None = None,
 ) -> Functional:
     """The gradient of a volume by the cells of a surface, every cell a picket; many cells are put together.
 
@@ -139,15 +143,17 @@ def cell_volume(
     ----------
     sigma : m, σ of the noise of every cell, on the same cells; None where not known.
     drawn : as of `tin_volume`. counted : which cells count; None: all that have a height.
+    bridges : cells bridged below objects.
     """
     rows, columns = cells_within(surface.grid, boundary)[2:]
     factor = max(1, int(np.ceil(np.sqrt(rows * columns / MOST_CELLS))))
     size = max(factor, 1024 // factor * factor)
     extra = _node_cells(surface.grid, nodes_of(base))
-    cells = _Cells(surface, boundary, extra, factor, sigma, base if drawn else None, counted)
+    cells = _Cells(surface, boundary, extra, factor, sigma, base if drawn else None, counted, bridges)
     parts = [_window_cells(cells, window) for window in windows(surface.grid, boundary, size)]
     xyz, gradient, share, noise = (np.concatenate([part[k] for part in parts]) for k in range(4))
-    return Functional(xyz, gradient, share, None if sigma is None else noise)
+    bridged = None if bridges is None else np.sum([part[4] for part in parts], axis=0)
+    return Functional(xyz, gradient, share, None if sigma is None else noise, bridged)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +167,7 @@ class _Cells:
     sigma: Surface | None
     moving: Base | None
     counted: Counted | None
+    bridges: Bridges | None
 
     def heights(self, window: tuple[int, int, int, int], margin: int) -> tuple[Grid, np.ndarray, np.ndarray]:
         """A window and some cells around it, heights with NaN where not known, and m² of every cell that count."""
@@ -172,15 +179,16 @@ class _Cells:
         if self.counted is not None:
             noise = None if self.sigma is None else self.sigma.read(*place).astype(float)
             d = self.counted.heights_of_cells(z, grid)
-            weight *= self.counted.share(d, self.counted.spread_of_cells(noise))
+            spread = np.hypot(self.counted.spread_of_cells(noise), sigma_of_bridges(self.bridges, place))
+            weight *= self.counted.share(d, spread)
         weight[~np.isfinite(z)] = 0.0
         return grid, z, weight
 
 
 def _window_cells(
     cells: _Cells, window: tuple[int, int, int, int]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Places, gradient, noise share and noise of the cells of a window."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Places, gradient, noise share and noise of the cells of a window; errors of every bridged patch."""
     row, column, rows, columns = window
     margin = 0 if cells.moving is None else DRAWN_MARGIN
     around, z_around, weight_around = cells.heights(window, margin)
@@ -213,7 +221,8 @@ def _window_cells(
     share = np.divide(squares[used], height**2, out=np.ones(len(height)), where=height**2 > 0.0)
     sigma = cells.sigma
     noise = np.zeros(len(share)) if sigma is None else together((weight * _noise(sigma, window)) ** 2, factor)[used]
-    return places, gradient, share, noise
+    bridged = np.zeros(0) if cells.bridges is None else cells.bridges.errors(window, weight)
+    return places, gradient, share, noise, bridged
 
 
 def _noise(sigma: Surface, window: tuple[int, int, int, int]) -> np.ndarray:

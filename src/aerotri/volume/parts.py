@@ -72,6 +72,7 @@ class Part:
     lasting : errors of its heights that do not average out.
     region : what of the boundary counts; None where all does.
     own_noise : m², variance of a height at a place that is its own alone.
+    bridged : (n,) m³, of every patch that is bridged below objects what its error makes; None where nothing is bridged.
     ground_sigma : gives by how much straight lines between heights are off the ground at a place, m; None: not known.
     side : gives the share of what of it counts: of a cut or a fill alone.
     """
@@ -88,6 +89,7 @@ class Part:
     side: Callable[[Counted], Part] | None = None
     own_noise: float = 0.0
     ground_sigma: Callable[[], float] | None = None
+    bridged: np.ndarray | None = None
 
     def noise_at(self, apart: float) -> float:
         """m², variance of the straight lines at a place; apart : as of `Counted`."""
@@ -99,6 +101,11 @@ class Part:
         """m⁶, of the volume by errors that do not average out."""
         m = self.measured
         return 0.0 if m is None else lasting_variance(m.pickets.xyz[:, :2], m.gradient[:, 2], self.lasting)
+
+    @property
+    def bridged_variance(self) -> float:
+        """m⁶, of the volume by errors of patches that are bridged."""
+        return 0.0 if self.bridged is None else float(np.sum(self.bridged**2))
 
 
 def part_of_cells(
@@ -121,7 +128,8 @@ def part_of_cells(
     within = 0.0 if ground is None else ground.sigma
     region = None if counted is None else region_of_cells(surface, boundary, counted, used, within)
     functional = cell_volume(
-        surface, boundary, base_over(base, region), own, options.boundary_from == "product", counted
+        surface, boundary, base_over(base, region), own, options.boundary_from == "product", counted,
+        noise.bridges,
     )  # fmt: skip
     of_cells = noise.photographs
     per_point = options.per_point if of_cells is None else photographs_at(of_cells, functional.xyz)
@@ -155,6 +163,7 @@ def part_of_cells(
         side,
         own_noise,
         lambda: within,
+        functional.bridged,
     )
 
 

@@ -84,10 +84,16 @@ class Line:
 NO_LINE = Line()
 
 
-def line_of_shared(d: np.ndarray, area: np.ndarray, spread: float) -> Line:
-    """Of an error of σ `spread`, m, that places with heights d (n,) m over the line and areas (n,) m² share."""
+def line_of_shared(d: np.ndarray, area: np.ndarray, spread: np.ndarray | float) -> Line:
+    """Of an error that places with heights d (n,) m over the line and areas (n,) m² share.
+
+    Parameters
+    ----------
+    spread : m, (n,) or of all, its σ.
+    """
+    spread = np.broadcast_to(spread, d.shape)
     near = np.isfinite(d) & (np.abs(d) < BEYOND * spread)
     if not near.any():
         return NO_LINE
-    h, a = d[near], area[near]
-    return Line(float(a @ excess(h, np.full(len(h), spread))), float(a @ density(h / spread)) * spread)
+    h, a, s = d[near], area[near], spread[near]
+    return Line(float(a @ excess(h, s)), float((a * s) @ density(h / s)))

@@ -13,6 +13,7 @@ import numpy as np
 from aerotri.rasters.grids import Grid
 from aerotri.volume.bases import PANELS, Base, Nodes, PlaneBase, SplineBase, Surface, integral_of_spline
 from aerotri.volume.boundary import Boundary
+from aerotri.volume.bridges import sigma_of_bridges
 from aerotri.volume.cell_noise import CellNoise
 from aerotri.volume.counted import PLACES, Counted, near_the_line
 from aerotri.volume.rectified import NO_LINE, Line, expected_above, line_of_shared
@@ -89,10 +90,11 @@ def region_of_cells(surface: Surface, boundary: Boundary, counted: Counted, nois
         area = boundary.coverage(grid) * cell * np.isfinite(d)
         sigma = None if noise.sigma is None else noise.sigma.read(row, column, rows, columns).astype(float)
         sigma = None if sigma is None else np.sqrt(sigma**2 + counted.noise)
-        weight = area * counted.share(d, counted.spread_of_cells(sigma))
+        bridge = sigma_of_bridges(noise.bridges, (row, column, rows, columns))
+        weight = area * counted.share(d, np.hypot(counted.spread_of_cells(sigma), bridge))
         lattice.add(*_placed(grid, weight))
         if counted.sign:
-            line += line_of_shared(d.ravel(), area.ravel(), counted.spread)
+            line += line_of_shared(d.ravel(), area.ravel(), np.hypot(counted.spread, bridge).ravel())
             line += Line(between=line_of_shared(d.ravel(), area.ravel(), within).moved)
             line += NO_LINE if sigma is None else Line(noise=_added_by_noise(d, area, sigma, block))
     return lattice.region(counted.sign, line)

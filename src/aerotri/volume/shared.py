@@ -97,8 +97,12 @@ def summed_part(parts: Sequence[Part], corrected: bool) -> Part:
     between = Between(sum(b.curvature for b in known), sum(b.variance for b in known)) if known else None
     response = respond(first.calibration, joint.pickets, gradient, corrected)
     unseen = sum(part.unseen for part in parts)
+    # patches are those of the whole surface: one that reaches into two volumes errs in both
+    each = [part.bridged for part in parts if part.bridged is not None]
+    bridged = np.sum(each, axis=0) if each else None
     return Part(
-        first.calibration, response, between, len(joint.pickets), len(joint.pickets.image), unseen, joint, first.lasting
+        first.calibration, response, between, len(joint.pickets), len(joint.pickets.image), unseen, joint,
+        first.lasting, bridged=bridged,
     )  # fmt: skip
 
 

@@ -20,9 +20,10 @@ from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise, p
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.image_errors import image_groups
 from aerotri.image_errors.error_function import ErrorFunction, error_function
-from aerotri.volume.accuracy import PARTS, boundary_variance
+from aerotri.volume.accuracy import PARTS
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import Boundary, boundary_of
+from aerotri.volume.drawn_edge import boundary_variance
 from aerotri.volume.functionals import tin_volume, triangulated
 from aerotri.volume.parts import part_of_pickets
 from aerotri.volume.pickets import Pickets, pickets_where_seen

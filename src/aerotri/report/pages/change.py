@@ -23,6 +23,7 @@ NOTHING = "no cell is beyond the level of detection"
 PARTS = {
     "adjustment": "adjustments", "model": "image errors that photographs share",
     "matching_shared": "matching errors that neighbouring cells share",
+    "bridged": "ground that is bridged below objects",
 }  # fmt: skip
 UNKNOWNS = {
     "dZ": ("height", 1e3, "mm"), "dX": ("X", 1e3, "mm"), "dY": ("Y", 1e3, "mm"),

@@ -22,6 +22,8 @@ from aerotri.results.head import Head
 
 RESULT = "result"
 """Folder of the adjustment."""
+ON_SURFACE = {"volume": ", on the terrain (pickets)", "dsm_volume": ", on the dense surface"}
+"""Folders of volumes, and what each was measured on, in words."""
 LARGEST_PLOTS = 12
 """Plots of a step that has no report of its own."""
 IN_PARTS = ("sigma_Z_m",)
@@ -70,7 +72,8 @@ def run_page(
     folder : where the steps wrote. head : of the page. files : that steps wrote, by their names.
     """
     environment = page_environment()
-    done = {step["name"]: folder / step["folder"] for step in content["steps"] if step["status"] == "done"}
+    done = {step["folder"]: folder / step["folder"] for step in content["steps"] if step["status"] == "done"}
+    named = {step["folder"]: step["name"] for step in content["steps"]}
     shown = _pictures(done)
     steps = [_step(step, folder / step["folder"], set(shown)) for step in content["steps"]]
     for step in steps:
@@ -79,20 +82,21 @@ def run_page(
     adjusted = _read(folder / RESULT / "adjustment.json")
     return template.render(
         source=printable(Path(content["source"]).name or content["source"]),
-        seconds=content["seconds"], steps=steps, verdict=_verdict(adjusted), doubts=_doubts(done),
-        results=_results({name: _read(place / f"{name}.json") for name, place in done.items()}),
+        seconds=content["seconds"], steps=steps, verdict=_verdict(adjusted),
+        doubts=_doubts([(named[at], place) for at, place in done.items()]),
+        results=_results({name: _read(place / f"{named[name]}.json") for name, place in done.items()}),
         pictures=list(shown.values()), head=page_head(head),
     )  # fmt: skip
 
 
-def _doubts(done: Mapping[str, Path]) -> dict[str, str]:
+def _doubts(done: Sequence[tuple[str, Path]]) -> dict[str, str]:
     """What is to be known of surface and orthophoto first, and of which of them; the verdict has its own place.
 
     What their own pages begin with comes before the rest.
     """
     found: dict[str, list[str]] = {}
     rank: dict[str, int] = {}
-    for name, place in done.items():
+    for name, place in done:
         parts = _parts_of(name, place)
         if parts is None:
             continue
@@ -129,18 +133,13 @@ def _verdict(adjusted: Mapping[str, Any]) -> tuple[str, list[str]]:
 
 
 def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
-    """What was measured and how sure it is, a line each."""
+    """What was measured and how sure it is, a line each; of_step : what steps wrote, by their folders."""
     found = []
     if accuracy := of_step.get("accuracy"):
         found += _accuracy(accuracy)
-    if volume := of_step.get("volume"):
-        piles = volume.get("piles") or []
-        found += [(f"Volume of {printable(str(one['name']))}, net", _net(one, one["sigma_m3"])) for one in piles]
-        name = "Volume of all piles, net" if piles else "Volume, net"
-        found.append((name, _net(volume, (volume.get("sigma") or {}).get("sigma_m3"))))
-        if mass := volume.get("mass"):
-            text = f"{tonnes(mass)} t at {mass['density_t_per_m3']:g} t/m³"
-            found.append(("Mass of all piles, net" if piles else "Mass, net", text))
+    measured = [(on, volume) for name, on in ON_SURFACE.items() if (volume := of_step.get(name))]
+    for on, volume in measured:
+        found += _volume(volume, on if len(measured) > 1 else "")
     if surface := of_step.get("dsm"):
         sigma = surface["sigma_Z_m"]["median"]
         found.append(
@@ -150,6 +149,18 @@ def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
         total = image["sigma_m"]["total"]
         text = f"cells of {image['cell_m']:g} m; σ of positions {two_digits(total['median'])} m (median), 95 % below "
         found.append(("Orthophoto", f"{text}{two_digits(total['q95'])} m"))
+    return found
+
+
+def _volume(volume: Mapping[str, Any], on: str) -> list[tuple[str, str]]:
+    """Volumes and masses; on : which surface, where there are several."""
+    piles = volume.get("piles") or []
+    found = [(f"Volume of {printable(str(one['name']))}, net{on}", _net(one, one["sigma_m3"])) for one in piles]
+    name = "Volume of all piles, net" if piles else "Volume, net"
+    found.append((f"{name}{on}", _net(volume, (volume.get("sigma") or {}).get("sigma_m3"))))
+    if mass := volume.get("mass"):
+        text = f"{tonnes(mass)} t at {mass['density_t_per_m3']:g} t/m³"
+        found.append((f"Mass of all piles, net{on}" if piles else f"Mass, net{on}", text))
     return found
 
 

@@ -13,7 +13,7 @@ from aerotri.report.pages.head import page_environment, page_head, settings_rows
 from aerotri.report.plots.rendering import RenderedPlot
 from aerotri.report.quality import printable, two_digits, with_sigma
 from aerotri.results.head import Head
-from aerotri.volume.accuracy import LASTING, MODEL
+from aerotri.volume.accuracy import BRIDGED, LASTING, MODEL
 
 CAPTIONS = {
     "budget": (
@@ -86,6 +86,7 @@ def _budget(c: Mapping[str, Any]) -> str:
     shared = {
         MODEL: "image errors that photographs share",
         LASTING: "matching errors that neighbouring cells share",
+        BRIDGED: "ground that is bridged below objects",
     }
     largest = shared.get(largest, largest)
     known, wide = two_digits(s["sigma_m3"]), two_digits(1.96 * s["sigma_m3"])

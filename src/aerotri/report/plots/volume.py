@@ -30,7 +30,7 @@ from aerotri.report.plots.canvas import (
     write_name,
 )
 from aerotri.report.quality import two_digits, with_sigma
-from aerotri.volume.accuracy import LASTING, MODEL
+from aerotri.volume.accuracy import BRIDGED, LASTING, MODEL
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.compute import Volumes
 from aerotri.volume.sections import Profile, Sections, direction_of
@@ -52,6 +52,7 @@ WORDS = {
     MODEL: "image errors that photographs share",
     "matching": "matching of the points",
     LASTING: "matching, errors that neighbouring cells share",
+    BRIDGED: "ground below objects, bridged",
     "interpolation": "ground between the points",
     "base": "base",
     "boundary": "position of the boundary",

@@ -156,13 +156,13 @@ def bare_ground(outcome: DenseOutcome, widest: float) -> BareGround:
     beyond = np.asarray(binary_dilation(outside(share >= MEASURED_SHARE), np.ones((3, 3), bool)), bool)
     lowest = _without_low_errors(lowest, coarse.cell_x)
     kept = ground_cells(lowest, coarse.cell_x, widest=widest)
-    lowest = _filled(np.where(kept, lowest, np.nan))
+    lowest = filled(np.where(kept, lowest, np.nan))
     z, sigma = _means(o, coarse, lowest)
     known = np.isfinite(z)
     law = bridge_law(z, coarse.cell_x, widest)
     away = _away(known, coarse.cell_x)
     bridged = np.where(away <= 0.5 * widest, bridged_heights(z), np.nan)
-    return BareGround(o, widest, coarse, lowest, np.where(known, z, bridged), _filled(sigma), away, law, beyond)
+    return BareGround(o, widest, coarse, lowest, np.where(known, z, bridged), filled(sigma), away, law, beyond)
 
 
 def outside(measured: np.ndarray) -> np.ndarray:
@@ -268,7 +268,7 @@ def _without_low_errors(z: np.ndarray, cell: float) -> np.ndarray:
     """What lies as a lone pit far below its neighbours is taken out."""
     if not np.isfinite(z).any():
         return z
-    above = -_filled(z)
+    above = -filled(z)
     return np.where(above - grey_opening(above, footprint=_disc(1)) > LOW_SLOPE * cell, np.nan, z)
 
 
@@ -324,8 +324,8 @@ def _between(coarse: Grid, values: np.ndarray, grid: Grid) -> np.ndarray:
     return map_coordinates(values, at, order=1, mode="nearest")
 
 
-def _filled(values: np.ndarray) -> np.ndarray:
-    """Holes as the nearest known cell."""
+def filled(values: np.ndarray) -> np.ndarray:
+    """(rows, columns), holes as the nearest known cell; 0 where none is known."""
     known = np.isfinite(values)
     if not known.any():
         return np.zeros(values.shape)

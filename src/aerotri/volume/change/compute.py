@@ -16,6 +16,7 @@ import numpy as np
 
 from aerotri.conventions import SIGMAS_OF_95
 from aerotri.rasters.grids import Grid
+from aerotri.volume.bridges import errors_of_patches
 from aerotri.volume.change.adjusted import AdjustedPair, AlignedPair
 from aerotri.volume.change.alignment import NO_ALIGNMENT, Align, Alignment, align
 from aerotri.volume.change.noise import variance_of_sum
@@ -23,7 +24,22 @@ from aerotri.volume.lasting import NO_LASTING, Lasting, lasting_variance_of_cell
 
 LEVEL = SIGMAS_OF_95
 """Of 95 %: changes beyond so many σ are told from noise."""
-PARTS = ("noise", "alignment", "adjustment", "model", "matching_shared")
+PARTS = ("noise", "alignment", "adjustment", "model", "matching_shared", "bridged")
+
+
+@dataclass(frozen=True, eq=False)
+class BridgedCells:
+    """(rows, columns), m, σ of cells that are bridged, 0 of others, and the number of the patch each belongs to.
+
+    σ is in that of the cell's noise too; in a volume it counts as of cells that err together, `volume.bridges`.
+    """
+
+    sigma: np.ndarray
+    patch: np.ndarray
+
+    def variance(self, weight: np.ndarray) -> float:
+        """m⁶, of a volume with weights (rows, columns) m²."""
+        return float(np.sum(errors_of_patches(self.patch, weight, self.sigma, int(self.patch.max(initial=0))) ** 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +50,7 @@ class Epoch:
     ----------
     z : (rows, columns) m. noise : σ of each cell's own noise, m, NaN where not stated.
     adjustment : σ of what the adjustment adds, m, 0 where not known. sharing : cells of one noise.
-    lasting : errors of the heights that do not average out.
+    lasting : errors of the heights that do not average out. bridge : cells that are bridged below objects; None: none.
     """
 
     z: np.ndarray
@@ -42,6 +58,7 @@ class Epoch:
     adjustment: np.ndarray
     sharing: float = 1.0
     lasting: Lasting = NO_LASTING
+    bridge: BridgedCells | None = None
 
 
 @dataclass(frozen=True)
@@ -137,7 +154,9 @@ def compute_change(
     sigma = np.sqrt(noise**2 + by_alignment + adjustment**2)
     difference = np.where(np.isfinite(sigma), difference, np.nan)
     lasting = first.lasting, second.lasting
-    cells = _Cells(grid, difference, noise, adjustment, design, found, sharing, pair, lasting)
+    bridges = [one.bridge for one in (first, second) if one.bridge is not None]
+    alone = np.sqrt(np.maximum(noise**2 - sum(one.sigma**2 for one in bridges), 0.0))
+    cells = _Cells(grid, difference, alone, adjustment, design, found, sharing, pair, lasting, bridges)
     significant = np.abs(difference) > LEVEL * sigma
     volumes = tuple(cells.volume(name, part, significant) for name, part in areas)
     own = np.diag(found.covariance)
@@ -168,6 +187,7 @@ class _Cells:
     sharing: float
     pair: AlignedPair | None
     lasting: tuple[Lasting, Lasting]
+    bridges: Sequence[BridgedCells]
 
     def volume(self, name: str, part: np.ndarray, significant: np.ndarray) -> ChangedVolume:
         """Of the cells of an area."""
@@ -196,5 +216,6 @@ class _Cells:
             np.sqrt(noise),
             np.sqrt(model),
             np.sqrt(sum(lasting_variance_of_cells(weight, cell, one) for one in self.lasting)),
+            np.sqrt(sum(one.variance(weight) for one in self.bridges)),
         )
         return {name: float(value) for name, value in zip(PARTS, values, strict=True)}
