@@ -16,6 +16,8 @@ from typer.models import CommandInfo, OptionInfo
 from aerotri.cli import app
 from aerotri.cli.app import invoke
 from aerotri.conventions import InputError
+from aerotri.reference.command_lines import command_lines
+from aerotri.reference.files import described_files
 
 WITHOUT_TARGET = {
     "view", "init", "check", "diff", "explain", "predict volume", "predict attitude", "predict picket-interval",
@@ -138,3 +140,15 @@ def test_old_forms_work_and_say_so(tmp_path, capsys):
         invoke(["parameters", "--out", str(tmp_path / "a"), "--draw", str(tmp_path / "b")])
     with pytest.raises(InputError, match="--out is missing"):
         invoke(["convert", "anything"])
+
+
+def test_plots_names_the_page_that_is_written_with_it():
+    """Of every command whose page is drawn with its plots, and no other command speaks of a page it does not write."""
+    pages = {one.place.removeprefix("folder of "): one.name for one in described_files()
+             if one.form == "page" and one.when == "unless --no-plots"}  # fmt: skip
+    told = {command.name: option.text for command in command_lines(app) for option in command.options
+            if "--plots" in option.names}  # fmt: skip
+    assert pages.keys() >= {"dsm", "ortho"}
+    for name in pages.keys() & told.keys():
+        assert pages[name] in told[name] or "the page" in told[name], name
+    assert not [name for name, text in told.items() if "page" in text and name not in pages]

@@ -64,6 +64,9 @@ def titles(words, known):
         ("rank deficient", "rank deficient — word of a result of status of an adjustment"),
         ("brown.K1", "brown.K1 — parameter of additional_parameters"),
         ("gnss", "[gnss] — table of block.toml"),
+        ("sigma_x", "sigma_x — dimension of dsm.laz (folder of dsm)"),
+        ("dsm.laz cov_xy", "cov_xy — dimension of dsm.laz (folder of dsm)"),
+        ("NormalZ", "NormalZ — dimension of dsm.laz (folder of dsm)"),
     ],
 )
 def test_found(words, first, known):

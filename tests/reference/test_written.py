@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import jsonschema
+import laspy
 import pyarrow.parquet as pq
 import pytest
 
@@ -14,6 +15,7 @@ from aerotri.reference.files import described_files
 from aerotri.reference.schemas import json_files, schema_of
 
 FILES = {described.label: described for described in described_files()}
+CLOUDS = [one for one in described_files() if one.form == "cloud"]
 TABLES = [one for one in described_files() if one.form == "table"]
 JSON_FILES = [one for one in json_files() if one.place != "printed"]
 PRINTED_CONTENT = {
@@ -65,6 +67,15 @@ def test_columns(written, described):
         assert [name for name in described.columns if name in header] == list(header), path
         seen |= set(header)
     assert required <= seen
+
+
+@pytest.mark.parametrize("described", CLOUDS, ids=lambda one: one.label)
+def test_dimensions_of_clouds(written, described):
+    paths = found(written, described)
+    assert paths
+    for path in paths:
+        with laspy.open(path) as cloud:
+            assert tuple(cloud.header.point_format.extra_dimension_names) == described.columns
 
 
 @pytest.mark.parametrize("described", JSON_FILES, ids=lambda one: one.label)

@@ -148,3 +148,53 @@ def test_little_ground_has_the_slope_of_the_filter():
     z[:3] = 5.0
     law = bridge_law(z, 1.0, 18.0)
     assert (law.at_1_m, law.power) == (0.15, 1.0)
+
+
+@pytest.fixture(scope="module")
+def bay(tmp_path_factory):
+    """Even ground with two houses and a hole; without heights a bay of 6 m that lone matches close, and a corner."""
+    row, column = np.mgrid[:SIDE, :SIDE] * CELL
+    z = 50.0 + 0.02 * column + 0.03 * row
+    here = {
+        "house": (np.abs(row - 60.0) < 5.0) & (np.abs(column - 70.0) < 6.0),
+        "house beside": (np.abs(row - 20.0) < 4.0) & (column > 6.0) & (column < 14.0),
+        "hole": np.hypot(row - 90.0, column - 60.0) < 3.0,
+        "frame": column < 5.0,
+        "bay": (np.abs(row - 60.0) < 3.0) & (column < 25.0),
+        "corner": (row < 12.0) & (column > 100.0),
+    }
+    z[here["house"] | here["house beside"]] += 6.0
+    z[here["hole"] | here["frame"] | here["bay"] | here["corner"]] = np.nan
+    by_chance = here["bay"] & (np.abs(column - 10.0) < 0.3) & (row % 0.5 == 0.0)
+    z[by_chance] = 50.0
+    found = bare_ground(outcome_of(tmp_path_factory.mktemp("tiles"), z), 18.0)
+    source = np.zeros(z.shape, np.uint8)
+    for w, tile in found.tiles():
+        source[w.row : w.row + w.rows, w.column : w.column + w.columns] = tile.source
+    return z, here, source
+
+
+def test_objects_and_holes_inside_are_bridged(bay):
+    _, here, source = bay
+    for name in ("house", "house beside", "hole"):
+        assert (source[here[name]] == BRIDGED).mean() > 0.99, name
+
+
+def test_nothing_is_bridged_beyond_the_outline(bay):
+    z, here, source = bay
+    for name in ("frame", "bay", "corner"):
+        assert not source[here[name] & ~np.isfinite(z)].any(), name
+    assert (source[np.isfinite(z)] != 0).mean() > 0.99
+
+
+def test_a_ring_is_bridged_unless_it_leads_outside(tmp_path):
+    """A ring without heights, with heights in it and around it; then a channel from it to the border."""
+    z = np.full((160, 160), 50.0)
+    row, column = np.mgrid[:160, :160] * CELL
+    ring = np.hypot(row - 20.0, column - 20.0)
+    z[(ring > 8.0) & (ring < 12.0)] = np.nan
+    closed = bare_ground(outcome_of(tmp_path, z), 18.0)
+    assert sum(int((tile.source == BRIDGED).sum()) for _, tile in closed.tiles()) > 3000
+    z[(np.abs(row - 20.0) < 2.0) & (column > 28.0)] = np.nan
+    open_ = bare_ground(outcome_of(tmp_path, z), 18.0)
+    assert not sum(int((tile.source == BRIDGED).sum()) for _, tile in open_.tiles())

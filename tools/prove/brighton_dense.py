@@ -6,20 +6,26 @@ leaves (no control, GNSS of metres) is in them, and is taken off in the columns 
 bowl over σ of matching (robust σ); the cloud has errors of its own, of which nothing is known. Below the table stands
 what the adjustment says of heights after the alignment, by noise and by what its parameters leave of the camera's
 errors. The same is printed for what OpenCV's semi-global matching alone gives on the same epipolar images and for the
-surface of pickets. Looks inside the package on purpose. Measures: heights of a joint covariance. Prints Markdown.
+surface of pickets. Cells are counted where the two surfaces lie; how many are covered once ours is moved onto the
+cloud, and each of its cells counts for all the cloud's cells that it lies over, stands below the table. --model takes
+another set of parameters, auto the one that the program chooses. Looks inside the package on purpose. Measures: heights
+of a joint covariance. Prints Markdown.
 
     python tools/prove/brighton_dense.py OUT --data ../shared/data/brighton > tools/results/brighton_dense.md
+    python tools/prove/brighton_dense.py OUT_AUTO --model auto > tools/results/brighton_dense_auto.md
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import laspy
 import numpy as np
 import rasterio
+from scipy.spatial.transform import Rotation
 
 import aerotri
 from aerotri.deformation.model_grid import places_of
@@ -27,7 +33,7 @@ from aerotri.deformation.restitution import restitution_of
 from aerotri.public.dense import DenseSurface
 from aerotri.statistics.camera_field import known_field, noise_beside_field
 from aerotri.terrain.adjustment_part import _by_unknowns as by_unknowns
-from brighton_surface import GSD_M, bowl_basis, differences, modelled, nmad, robust_fit
+from brighton_surface import GSD_M, MODELS, bowl_basis, differences, modelled, nmad, robust_fit
 from dense_surface import semi_global_surface
 
 FAR_M, SQUARE_M, LEAST_OPEN, MOST_OPEN = 0.2, 1.0, 0.01, 0.4
@@ -69,6 +75,22 @@ def missing(raster: Path, cloud: Path, cell: float) -> str:
         f"{100.0 * MOST_OPEN:.0f} % are open. {100.0 * np.mean(share < LEAST_OPEN):.0f} % of the cloud's cells lie in "
         f"squares that are covered to {100.0 * (1.0 - LEAST_OPEN):.0f} % and more."
     )
+
+
+def covered_when_moved(raster: Path, cloud: Path, cell: float, compared: Path) -> float:
+    """Share of the cloud's cells that ours lie over, moved by the alignment that the comparison wrote."""
+    said = json.loads((compared / "compare.json").read_text(encoding="utf-8"))["alignment"]
+    with rasterio.open(raster) as file:
+        z, own = file.read(1, masked=True), file.transform.a
+        rows, columns = np.nonzero(~np.ma.getmaskarray(z))
+        xyz = np.column_stack([*file.xy(rows, columns), z.data[rows, columns]])
+    about = np.array(said["about_m"])
+    x, y, _ = (Rotation.from_rotvec(said["rotation_rad"]).apply(xyz - about) + about + said["shift_m"]).T
+    quarters = [(0.25 * i * own, 0.25 * j * own) for i in (-1, 1) for j in (-1, 1)]
+    ours = np.unique(np.concatenate([cells_of(x + dx, y + dy, cell) for dx, dy in quarters]))
+    points = laspy.read(cloud)
+    theirs = cells_of(np.asarray(points.x), np.asarray(points.y), cell)
+    return len(np.intersect1d(ours, theirs)) / len(theirs)
 
 
 def row(name: str, raster: Path, data: Path, folder: Path) -> str:
@@ -136,11 +158,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path, help="folder for the results")
     parser.add_argument("--data", type=Path, default=Path("../shared/data/brighton"))
+    parser.add_argument(
+        "--model", choices=list(MODELS), default="lens", help="parameters, as brighton_surface has them"
+    )
     options = parser.parse_args()
     out, photographs = options.out, options.data / "images"
     if not (out / "block").exists():
         aerotri.tie_points(photographs).save(out / "block")
-    result = aerotri.adjust(modelled(aerotri.read_block(out / "block"), "lens"), explain=False)
+    result = aerotri.adjust(modelled(aerotri.read_block(out / "block"), options.model), explain=False)
     print("# Brighton's dense surface against another program's cloud (tools/prove/brighton_dense.py)\n")
     print(HEAD + "\n|" + "---|" * (HEAD.count("|") - 1), flush=True)
     dense = aerotri.dense_surface(result, photographs)
@@ -153,7 +178,16 @@ def main() -> None:
     said = missing(out / "dense" / "dsm.tif", options.data / "model.laz", 2.0 * GSD_M)
     print(row("pickets", out / "dtm" / "dsm.tif", options.data, out / "pickets_compared"), flush=True)
     noise, left = after_alignment(result, dense)
-    print(f"\n{said}\n")
+    moved = covered_when_moved(
+        out / "dense" / "dsm.tif", options.data / "model.laz", 2.0 * GSD_M, out / "dense_compared"
+    )  # fmt: skip
+    print(f"\n{said} Moved onto the cloud the dense surface lies over {100.0 * moved:.1f} % of them.\n")
+    s = dense.summary
+    print(
+        f"The surface states a σ of Z of {s['sigma_Z_m']['median']:.1f} m (median); its GSD is "
+        f"{100.0 * s['gsd_m']:.2f} cm, the cloud is taken in cells of {200.0 * GSD_M:.2f} cm, "
+        f"ours are {100.0 * s['cell_m']:.2f} cm.\n"
+    )
     print(
         f"After the alignment the adjustment brings {noise / GSD_M:.2f} GSD by noise and {left / GSD_M:.2f} GSD by "
         "what its parameters leave of the errors of the camera."

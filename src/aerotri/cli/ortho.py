@@ -83,8 +83,8 @@ def ortho(
     ] = DEFAULTS.fill,
     plots: Annotated[
         bool, typer.Option(
-            help="Draw the orthophoto with σ, and the points in it: PNG and SVG in the folder plots. A page has run "
-            "alone.", rich_help_panel=OUTPUT,
+            help="Draw the orthophoto with σ, and the points in it: PNG and SVG in the folder plots; write the page "
+            "ortho.html.", rich_help_panel=OUTPUT,
         ),
     ] = True,
     json_: Json = False,

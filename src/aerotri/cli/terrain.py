@@ -228,7 +228,7 @@ def dsm(
     plots: Annotated[
         bool,
         typer.Option(
-            help="Draw heights with their σ, and colours: PNG and SVG in the folder plots. A page has run alone.",
+            help="Draw heights with their σ, and colours: PNG and SVG in the folder plots; write the page dsm.html.",
             rich_help_panel=OUTPUT,
         ),
     ] = True,

@@ -52,7 +52,7 @@ class DenseSurface:
     keeper : what removes the tiles when nobody uses them any more; None where they stay.
     head : of files. settings : every argument that was used, as dsm.json has them.
     missing : photographs of the block that were not given.
-    notes : on the input and on what σ lacks, in sentences.
+    of_input : notes on the input and on what σ lacks, in sentences.
     adjusted : verdict and check points of the adjustment, as dsm.json has them.
     """
 
@@ -65,7 +65,7 @@ class DenseSurface:
     head: Head = field(default_factory=Head)
     settings: list[dict[str, Any]] = field(default_factory=list)
     missing: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    of_input: tuple[str, ...] = ()
     adjusted: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
@@ -105,13 +105,23 @@ class DenseSurface:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The content of dsm.json: cells, σ and its parts."""
-        from aerotri.formats.results.dense import dense_json
-
-        found = dense_json(self.record, self.block, self.crs, self.ground)
-        return self.head.as_dict() | found | {
+        return self.head.as_dict() | self._numbers | {
             "photographs_missing": list(self.missing), "adjustment": self.adjustment, "settings": self.settings,
             "notes": list(self.notes), "adjusted": self.adjusted,
         }  # fmt: skip
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be known of it, in sentences: a large σ first, then notes on the input."""
+        from aerotri.report.quality import many_cells
+
+        return (*many_cells("heights", self._numbers["sigma_Z_m"]["median"], self._numbers["cell_m"]), *self.of_input)
+
+    @cached_property
+    def _numbers(self) -> dict[str, Any]:
+        from aerotri.formats.results.dense import dense_json
+
+        return dense_json(self.record, self.block, self.crs, self.ground)
 
     @property
     def plot(self) -> DensePlots:

@@ -216,7 +216,7 @@ def _made(
         if plots:
             report.stage("drawing", None)
             _draw(OrthoPlots(outcome, folder, points, str(record.result.block.name)), summary, folder, head)
-    return Orthophoto(out, summary, outcome, points, notes)
+    return Orthophoto(out, summary, outcome, points, tuple(summary["notes"]))
 
 
 def _draw(plots: OrthoPlots, summary: dict[str, Any], folder: Path, head: Head) -> None:
@@ -238,12 +238,14 @@ def _described(
     from aerotri.formats.results.json_text import write_json
     from aerotri.formats.results.ortho import marked_points, ortho_json, write_seams
     from aerotri.rasters.grids import horizontal_crs
+    from aerotri.report.quality import many_cells
 
     block = record.result.block
     write_seams(folder / SEAMS, outcome, horizontal_crs(block.crs))
     summary = head | ortho_json(outcome, block, name, settings.resampling)
+    large = many_cells("positions", summary["sigma_m"]["total"]["median"], summary["cell_m"])
     summary["settings"] = used_settings(orthophoto, settings, {"cell": "m", "area": "m"})
-    summary |= said | {"adjusted": adjusted_json(record.result)}
+    summary |= said | {"notes": [*large, *said["notes"]], "adjusted": adjusted_json(record.result)}
     write_json(folder / RECORD, summary)
     return outcome, summary, tuple(marked_points(outcome, block))
 

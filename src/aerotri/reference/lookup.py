@@ -31,6 +31,7 @@ KINDS = {
     "printed word": ("RMSE_V", "cut"),
     "file": ("points.csv", "work_list.csv"),
     "column": ("sZ", "points.csv sZ"),
+    "dimension": ("sigma_x", "dsm.laz cov_xy"),
     "option": ("--robust", "adjust --robust"),
     "parameter": ("brown.K1", "bluh.1"),
     "word of a result": ("rejected", "rank deficient"),
@@ -40,6 +41,8 @@ KINDS = {
 FIRST = "adjustment.json (result of adjust)"
 """The file whose keys are told before those of other files."""
 CAMERA = re.compile(r"^camera\.[^.]+\.")
+ITEMS = {"json": ("JSON key", "keys"), "cloud": ("dimension", "dimensions"), "table": ("column", "columns")}
+"""What the items of a file of some form are, one and many."""
 NAMED = 5
 """Near names that are offered where a word is not known; chosen [C]: more are no help."""
 
@@ -194,13 +197,12 @@ def _tables(file: str, tables: Mapping[str, str], keys: Sequence[BlockKey]) -> l
 
 
 def _of_file(described: DescribedFile) -> Iterator[Entry]:
-    is_json = described.form == "json"
+    is_json, (kind, plural) = described.form == "json", ITEMS.get(described.form, ITEMS["table"])
     names = ", ".join(name for name in described.columns if "." not in name and name != "[]")
-    facts = {"written": described.when, "keys" if is_json else "columns": names}
+    facts = {"written": described.when, plural: names}
     yield Entry("file", described.name, described.place, described.text, _facts(facts), {})
     for item in described.items:
         if item.name != "[]":
-            kind = "JSON key" if is_json else "column"
             yield Entry(kind, item.name, described.label, item.text, _facts(_of_item(item, is_json)), item.values)
 
 

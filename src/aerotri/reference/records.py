@@ -9,13 +9,13 @@ from typing import Literal
 Kind = Literal[
     "text", "text?", "number", "number?", "whole", "yes/no", "yes/no?", "object", "object?", "list of text", "anything"
 ]
-Form = Literal["table", "json", "raster", "text", "picture", "page", "folder", "other"]
+Form = Literal["table", "json", "raster", "text", "picture", "page", "folder", "cloud", "other"]
 AXES = ("X", "Y", "Z")
 
 
 @dataclass(frozen=True)
 class Item:
-    """A column of a table, or a key of a JSON file.
+    """A column of a table, a key of a JSON file, or a dimension of a point cloud.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class DescribedFile:
     ----------
     name : of the file. place : the folder it stands in, in words, such as 'result of adjust'.
     form : what kind of file. text : what it is.
-    items : its columns or keys. when : on what condition it is written, '' always.
+    items : its columns, keys or dimensions. when : on what condition it is written, '' always.
     """
 
     name: str

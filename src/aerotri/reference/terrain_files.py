@@ -35,6 +35,18 @@ PICKETS = (
     Item("steps_aside", "whole", "How often it was moved because its first place could not be measured."),
     Item("model", "whole", "Number of the pair of photographs, −1 where all photographs were used."),
 )
+CLOUD = (
+    *of_axes("Normal{}", "number", "{} of the normal of the surface there, which has length 1 and points upwards."),
+    *(Item(f"sigma_{a}", "number", f"Standard deviation of {a.upper()}, from the adjustment.", "m") for a in "xy"),
+    Item("sigma_z", "number", "Standard deviation of Z: matching and adjustment together.", "m"),
+    *(
+        Item(f"cov_{a}{b}", "number", f"Covariance of {a.upper()} and {b.upper()}, from the adjustment.", "m²")
+        for a, b in ("xy", "xz", "yz")
+    ),
+    Item("sigma_z_matching", "number", "Standard deviation of Z from matching alone.", "m"),
+    Item("photographs", "whole", "Number of photographs that measured the cell."),
+)
+"""Dimensions of dsm.laz beside those of every LAZ file."""
 MISSING = (Item("photographs_missing[]", "text", "Photographs of the block that were not among the files given."),)
 DTM_JSON = (
     *HEAD,
@@ -392,7 +404,13 @@ def terrain_files() -> tuple[DescribedFile, ...]:
             "Ground points measured by image matching (pickets), and the rejected ones.",
             PICKETS,
         ),
-        DescribedFile("pickets.laz", DTM, "other", "The accepted points as LAZ 1.4 with sigma_z; class 2 is ground."),
+        DescribedFile(
+            "pickets.laz",
+            DTM,
+            "cloud",
+            "The accepted points as LAZ 1.4; class 2 is ground. It has sigma_z besides.",
+            (Item("sigma_z", "number", "Standard deviation of Z: matching and adjustment together.", "m"),),
+        ),
         DescribedFile(
             "dsm.tif", DTM, "raster", "Surface with objects: band 1 height, band 2 its standard deviation, m."
         ),
@@ -423,10 +441,10 @@ def terrain_files() -> tuple[DescribedFile, ...]:
         DescribedFile(
             "dsm.laz",
             DSM,
-            "other",
-            "The cells as COPC 1.0, which is LAZ 1.4, with colours; extra bytes NormalX, NormalY, NormalZ, sigma_x, "
-            "sigma_y, sigma_z, m, "
-            "cov_xy, cov_xz, cov_yz, m², sigma_z_matching and photographs. Class 2 is ground.",
+            "cloud",
+            "The cells as COPC 1.0, which is LAZ 1.4, with colours. Class 2 is ground. Besides every point has "
+            "its normal, σ and covariances.",
+            CLOUD,
         ),
         DescribedFile(
             "plots",

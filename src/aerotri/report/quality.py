@@ -7,9 +7,12 @@ import numpy as np
 from aerotri.diagnosis.check_points import GroundStatistics, asprs_warning, ground_statistics
 from aerotri.diagnosis.finding import metre_digits, pixel_text
 
+MANY_CELLS = 2.0
+"""Cells of a median σ above which a surface or an orthophoto says so first; chosen [C]."""
+
 __all__ = [
-    "GroundStatistics", "asprs_warning", "ground_statistics", "metre_digits", "pixel_text", "printable", "two_digits",
-    "with_sigma",
+    "GroundStatistics", "asprs_warning", "ground_statistics", "many_cells", "metre_digits", "pixel_text", "printable",
+    "two_digits", "with_sigma",
 ]  # fmt: skip
 
 
@@ -30,3 +33,15 @@ def two_digits(value: float) -> str:
     """1 234 → '1 200', 0.0123 → '0.012'."""
     rounded = float(f"{value:.2g}")
     return (f"{rounded:,.0f}" if abs(rounded) >= 10.0 else f"{rounded:g}").replace(",", "\u2009").replace("-", "−")
+
+
+def many_cells(what: str, sigma: float | None, cell: float) -> tuple[str, ...]:
+    """A sentence where σ is many cells, none where it is not.
+
+    Parameters
+    ----------
+    what : has it, such as 'heights'. sigma : its median, m, None where not known. cell : m.
+    """
+    if sigma is None or not sigma > MANY_CELLS * cell:
+        return ()
+    return (f"{what} have a σ of {two_digits(sigma)} m (median), which is {two_digits(sigma / cell)} cells",)

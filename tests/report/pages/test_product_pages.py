@@ -42,6 +42,7 @@ ORTHO = {
     "photographs": [{"number": 0, "photograph": "1.jpg", "area_m2": 2498.0}],
     "notes": [], "adjusted": ADJUSTED, "settings": [],
 }  # fmt: skip
+LARGE = {"dsm": "sigma_Z_m__median", "ortho": "sigma_m__total__median"}
 PARTS = {"dsm": (dense_parts, DSM), "ortho": (ortho_parts, ORTHO)}
 
 
@@ -94,13 +95,25 @@ def test_what_is_wrong_with_the_adjustment_is_said_first(kind):
                             "bridge": {"sigma_at_1_m": 0.02, "power": 0.5}}}, "40.0 % of the ground in dtm.tif"),
         ("ortho", {"area_m2__bridged": 120.0}, "120 m² lie over bridged holes"),
         ("ortho", {"area_m2__without_photograph": 250.0}, "10.0 % of the surface is seen by no photograph"),
-        ("ortho", {"sigma_m__total__median": 0.5}, "σ of 0.5 m (median), which is 10 cells"),
+        ("ortho", {"sigma_m__total__median": 0.5}, "Positions have a σ of 0.5 m (median), which is 10 cells"),
+        ("dsm", {"sigma_Z_m__median": 16.0}, "Heights have a σ of 16 m (median), which is 160 cells"),
     ],
 )  # fmt: skip
 def test_doubts_of_the_product_are_told(kind, changes, said):
     parts_of, content = PARTS[kind]
     (doubt,) = parts_of(changed(content, **changes)).doubts
     assert said in doubt
+
+
+def test_a_large_sigma_is_said_once_and_before_all_but_a_wrong_adjustment():
+    said = "Heights have a σ of 16 m (median), which is 160 cells."
+    large = changed(DSM, sigma_Z_m__median=16.0, notes=[f"heights{said[7:-1]}", "1 is missing"],
+                    adjusted__control_points=0)  # fmt: skip
+    assert [text == said for text in dense_parts(large).doubts] == [True, False, False]
+    wrong = dense_parts(changed(large, adjusted__verdict="rejected")).doubts
+    assert "rejected" in wrong[0]
+    assert wrong[1] == said
+    assert not dense_parts(changed(DSM, sigma_Z_m__median=0.2)).doubts
 
 
 def test_numbers_have_their_units():
@@ -156,3 +169,37 @@ def test_the_page_of_a_run_says_the_same(tmp_path, kind):
     for name, value in parts.numbers:
         assert f"<td>{name}</td><td>{value}</td>" in page
     assert page.count("<figure") == len(parts.captions)
+
+
+@pytest.mark.parametrize("verdict", ["accepted", "doubtful"])
+def test_doubts_of_the_products_stand_at_the_top(tmp_path, verdict):
+    """Once each, with the products that have them; an accepted adjustment comes after them, another before."""
+    adjusted = {"verdict": verdict, "reason": "two disagree", "control_points": 0, "check_points": 3}
+    steps = []
+    for name, content in (("dsm", DSM), ("ortho", ORTHO)):
+        (tmp_path / name).mkdir()
+        large = changed(content, adjusted=adjusted, **{LARGE[name]: 16.0})
+        (tmp_path / name / f"{name}.json").write_text(json.dumps(large), encoding="utf-8")
+        steps.append({"name": name, "folder": name, "what": name, "status": "done", "reason": "", "seconds": 1.0,
+                      "arguments": [name]})  # fmt: skip
+    (tmp_path / "result").mkdir()
+    content = {"verdict": verdict, "reasons": [] if verdict == "accepted" else ["two disagree"]}
+    (tmp_path / "result" / "adjustment.json").write_text(json.dumps(content), encoding="utf-8")
+    page = run_page({"source": "photographs", "steps": steps, "seconds": 1.0}, tmp_path, Head())
+    top = page[: page.index("<h2>Steps</h2>")]
+    texts = ("Dense surface: Heights have a σ of 16 m (median), which is 160 cells.",
+             "Orthophoto: Positions have a σ of 16 m (median), which is 320 cells.",
+             "Dense surface and orthophoto: There are no control points")  # fmt: skip
+    assert [top.count(text) for text in texts] == [1, 1, 1]
+    assert sorted(texts, key=top.index) == list(texts)
+    assert "The adjustment is doubtful" not in top
+    doubts, said = top.index("To know first:"), top.index('class="verdict"')
+    assert (doubts < said) == (verdict == "accepted")
+
+
+def test_nothing_is_said_first_where_nothing_is_doubtful(tmp_path):
+    (tmp_path / "dsm").mkdir()
+    (tmp_path / "dsm" / "dsm.json").write_text(json.dumps(DSM), encoding="utf-8")
+    step = {"name": "dsm", "folder": "dsm", "what": "Surface", "status": "done", "reason": "", "seconds": 1.0,
+            "arguments": ["dsm"]}  # fmt: skip
+    assert "To know first" not in run_page({"source": "p", "steps": [step], "seconds": 1.0}, tmp_path, Head())

@@ -15,7 +15,7 @@ from aerotri.report.pages.product import (
     round_length,
     whole,
 )
-from aerotri.report.quality import printable
+from aerotri.report.quality import many_cells, printable
 
 FEW, MUCH_BRIDGED, LARGE_PX = 0.9, 0.1, 0.5
 """Share of the ground that has heights below which, share of it that is bridged and y-parallax (median of the pairs)
@@ -37,7 +37,7 @@ def dense_parts(c: Mapping[str, Any]) -> ProductParts:
 
 
 def _doubts(c: Mapping[str, Any]) -> list[str]:
-    found = doubts_of_adjustment(c)
+    found = doubts_of_adjustment(c, many_cells("heights", c["sigma_Z_m"]["median"], c["cell_m"]))
     if c["coverage"] < FEW:
         found.append(
             f"{percent(1.0 - c['coverage'])} of the ground that pairs of photographs show has no height. Water, "

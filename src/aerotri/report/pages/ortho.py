@@ -17,10 +17,10 @@ from aerotri.report.pages.product import (
     round_length,
     whole,
 )
-from aerotri.report.quality import printable, two_digits
+from aerotri.report.quality import many_cells, printable, two_digits
 
-MUCH_UNSEEN, MANY_CELLS = 0.02, 2.0
-"""Share of the surface that no photograph sees, and cells of σ, above which the page says so first; chosen [C]."""
+MUCH_UNSEEN = 0.02
+"""Share of the surface that no photograph sees above which the page says so first; chosen [C]."""
 CAPTIONS = {
     "orthophoto": "The orthophoto with control points (triangles) and check points (circles).",
     "sigma": "σ of X and of Y of what the orthophoto shows, all parts together. Dark is less sure.",
@@ -40,7 +40,8 @@ def ortho_parts(c: Mapping[str, Any]) -> ProductParts:
 
 
 def _doubts(c: Mapping[str, Any]) -> list[str]:
-    found, area, total = doubts_of_adjustment(c), c["area_m2"], c["sigma_m"]["total"]["median"]
+    area = c["area_m2"]
+    found = doubts_of_adjustment(c, many_cells("positions", c["sigma_m"]["total"]["median"], c["cell_m"]))
     if area["bridged"] > 0.0:
         found.append(f"{whole(area['bridged'])} m² lie over bridged holes of the surface: σ is not known there.")
     if area["without_photograph"] > MUCH_UNSEEN * area["surface"]:
@@ -48,9 +49,6 @@ def _doubts(c: Mapping[str, Any]) -> list[str]:
             f"{percent(area['without_photograph'] / area['surface'])} of the surface is seen by no photograph and "
             "stays empty."
         )
-    if total is not None and total > MANY_CELLS * c["cell_m"]:
-        cells = two_digits(total / c["cell_m"])
-        found.append(f"Positions have a σ of {two_digits(total)} m (median), which is {cells} cells.")
     return found
 
 

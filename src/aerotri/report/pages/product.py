@@ -76,24 +76,28 @@ def write_product_page(
     path.write_text(product_html(parts, content, plots, files, head), encoding="utf-8")
 
 
-def doubts_of_adjustment(content: Mapping[str, Any]) -> list[str]:
+def verdict_in_words(content: Mapping[str, Any]) -> list[str]:
+    """What is wrong with the adjustment as a whole, nothing where it was accepted; content : as below."""
+    a = content.get("adjusted") or {}
+    reason = f": {printable(a['reason'], 1000)}" if a.get("reason") else ""
+    if a.get("verdict") == "rejected":
+        return [f"The adjustment was rejected{reason}. Use this to find the error, not as a result."]
+    return [f"The adjustment is doubtful{reason}."] if a.get("verdict") == "doubtful" else []
+
+
+def doubts_of_adjustment(content: Mapping[str, Any], large: Sequence[str] = ()) -> list[str]:
     """What the adjustment and its points leave open; then the notes on the input.
 
     Parameters
     ----------
-    content : of dsm.json or ortho.json.
+    content : of dsm.json or ortho.json. large : what is said of a large σ; a note that says the same is left out.
     """
-    a, found = content.get("adjusted") or {}, []
-    reason = f": {printable(a['reason'], 1000)}" if a.get("reason") else ""
-    if a.get("verdict") == "rejected":
-        found.append(f"The adjustment was rejected{reason}. Use this to find the error, not as a result.")
-    elif a.get("verdict") == "doubtful":
-        found.append(f"The adjustment is doubtful{reason}.")
+    a, found = content.get("adjusted") or {}, [*verdict_in_words(content), *map(sentence, large)]
     if a and not a["control_points"]:
         found.append("There are no control points: σ says how well position and height are known without them.")
     if a and not a["check_points"]:
         found.append("There are no check points: σ is not tested by points that were not used.")
-    return found + [sentence(text) for text in content.get("notes") or []]
+    return list(dict.fromkeys([*found, *map(sentence, content.get("notes") or [])]))
 
 
 def fine_of_adjustment(content: Mapping[str, Any]) -> str:

@@ -15,7 +15,7 @@ from aerotri.conventions import counted
 from aerotri.report.pages.dense import dense_parts
 from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.pages.ortho import ortho_parts
-from aerotri.report.pages.product import FileText, ProductParts
+from aerotri.report.pages.product import FileText, ProductParts, verdict_in_words
 from aerotri.report.pages.volume import tonnes
 from aerotri.report.quality import printable, two_digits
 from aerotri.results.head import Head
@@ -83,9 +83,28 @@ def run_page(
     return template.render(
         source=printable(Path(content["source"]).name or content["source"]),
         seconds=content["seconds"], steps=steps, verdict=_verdict(adjusted),
+        doubts=_doubts([(named[at], place) for at, place in done.items()]),
         results=_results({name: _read(place / f"{named[name]}.json") for name, place in done.items()}),
         pictures=list(shown.values()), head=page_head(head),
     )  # fmt: skip
+
+
+def _doubts(done: Sequence[tuple[str, Path]]) -> dict[str, str]:
+    """What is to be known of surface and orthophoto first, and of which of them; the verdict has its own place.
+
+    What their own pages begin with comes before the rest.
+    """
+    found: dict[str, list[str]] = {}
+    rank: dict[str, int] = {}
+    for name, place in done:
+        parts = _parts_of(name, place)
+        if parts is None:
+            continue
+        verdict = verdict_in_words(_read(place / f"{name}.json"))
+        for number, text in enumerate(one for one in parts.doubts if one not in verdict):
+            found.setdefault(text, []).append(parts.kind)
+            rank.setdefault(text, number)
+    return {text: " and ".join(found[text]).capitalize() for text in sorted(found, key=rank.__getitem__)}
 
 
 def _pictures(done: Mapping[str, Path]) -> dict[Path, tuple[str, str, str]]:

@@ -2,7 +2,8 @@
 
 The simple morphological filter [L: Pingel, Clarke, McBride 2013] on the lowest heights of coarse cells tells where
 ground is; the fine cells near that ground are kept as measured. What is left open is bridged by triangles between the
-ground around it. How wrong a bridge is by its distance from the ground is measured on the ground itself: discs of it
+ground around it: below objects that were measured, and across holes that heights surround, not beyond the outline of
+the surface. How wrong a bridge is by its distance from the ground is measured on the ground itself: discs of it
 are taken out, bridged and compared; a power law leads from their distances to all [D].
 """
 
@@ -14,7 +15,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator
-from scipy.ndimage import binary_dilation, binary_erosion, distance_transform_edt, grey_opening, map_coordinates
+from scipy.ndimage import (
+    binary_dilation,
+    binary_erosion,
+    binary_fill_holes,
+    distance_transform_edt,
+    grey_opening,
+    map_coordinates,
+)
 from scipy.spatial import QhullError
 
 from aerotri.conventions import InputError
@@ -44,6 +52,9 @@ BYTES_OF_CELL = 200
 RADII = (1, 2, 4, 8)
 """Of the discs that are taken out to measure bridges, coarse cells."""
 FEWEST_BRIDGED = 30
+MEASURED_SHARE = 0.5
+"""Of the fine cells of a coarse one from which the way from outside ends there; chosen [C]: lone matches by chance on
+water or in leaves do not close a bay."""
 MEASURED, BRIDGED = 1, 2
 """Where a height of the ground comes from; 0 where there is none."""
 
@@ -79,6 +90,7 @@ class BareGround:
     outcome : the surface. widest : m, of an object. lowest : (rows, columns) m, the filter's own ground on the coarse
         grid, without holes; z : the mean ground, bridged, NaN where nothing is known; sigma : m, of matching at the
         nearest ground; away : m, from the ground. law : of bridges.
+    beyond : (rows, columns) bool, coarse cells outside the surface and their neighbours.
     """
 
     outcome: DenseOutcome
@@ -89,6 +101,7 @@ class BareGround:
     sigma: np.ndarray
     away: np.ndarray
     law: BridgeLaw
+    beyond: np.ndarray
 
     def tiles(self) -> Iterator[tuple[TileWindow, GroundTile]]:
         """The ground of every tile of the surface."""
@@ -105,11 +118,19 @@ class BareGround:
         grid = o.grid.window(window.row, window.column, window.rows, window.columns)
         bridge, of_rim, away = (_between(self.grid, values, grid) for values in (self.z, self.sigma, self.away))
         away = np.maximum(away, 0.5 * grid.cell_x)
-        open_ = ~ground & np.isfinite(bridge)
+        inside = np.isfinite(z) | ~self._coarse(self.beyond, window)
+        open_ = ~ground & np.isfinite(bridge) & inside
         source = np.where(ground, MEASURED, np.where(open_, BRIDGED, 0)).astype(np.uint8)
         height = np.where(ground, z, np.where(open_, bridge, np.nan))
         of_bridge = np.hypot(of_rim, self.law.sigma(away))
         return GroundTile(height, np.where(ground, sigma, np.where(open_, of_bridge, np.nan)), source)
+
+    def _coarse(self, values: np.ndarray, window: TileWindow) -> np.ndarray:
+        """Values of the coarse cells that the cells of a tile lie in."""
+        step = round(self.grid.cell_x / self.outcome.grid.cell_x)
+        row, column = (np.arange(first, first + count) // step for first, count in (
+            (window.row, window.rows), (window.column, window.columns)))  # fmt: skip
+        return values[np.ix_(row, column)]
 
 
 def bare_ground(outcome: DenseOutcome, widest: float) -> BareGround:
@@ -117,7 +138,7 @@ def bare_ground(outcome: DenseOutcome, widest: float) -> BareGround:
 
     Parameters
     ----------
-    widest : m, the widest object that is taken off, and the widest hole that is bridged.
+    widest : m, the widest object that is taken off, and the widest hole inside the surface that is bridged.
 
     Raises
     ------
@@ -130,7 +151,10 @@ def bare_ground(outcome: DenseOutcome, widest: float) -> BareGround:
         BYTES_OF_CELL * coarse.rows * coarse.columns, f"the ground of {coarse.rows} × {coarse.columns} cells",
         "give an --area, one part of the block after the other",
     )  # fmt: skip
-    lowest = _without_low_errors(_lowest(o, coarse), coarse.cell_x)
+    lowest, share = _lowest(o, coarse)
+    # a fine cell without a height may be outside in a coarse cell that has heights, so the neighbours count as well
+    beyond = np.asarray(binary_dilation(outside(share >= MEASURED_SHARE), np.ones((3, 3), bool)), bool)
+    lowest = _without_low_errors(lowest, coarse.cell_x)
     kept = ground_cells(lowest, coarse.cell_x, widest=widest)
     lowest = filled(np.where(kept, lowest, np.nan))
     z, sigma = _means(o, coarse, lowest)
@@ -138,7 +162,12 @@ def bare_ground(outcome: DenseOutcome, widest: float) -> BareGround:
     law = bridge_law(z, coarse.cell_x, widest)
     away = _away(known, coarse.cell_x)
     bridged = np.where(away <= 0.5 * widest, bridged_heights(z), np.nan)
-    return BareGround(o, widest, coarse, lowest, np.where(known, z, bridged), filled(sigma), away, law)
+    return BareGround(o, widest, coarse, lowest, np.where(known, z, bridged), filled(sigma), away, law, beyond)
+
+
+def outside(measured: np.ndarray) -> np.ndarray:
+    """(rows, columns) bool, cells from which a way over cells that are not measured leads beyond the border."""
+    return ~np.asarray(binary_fill_holes(measured), bool)
 
 
 def bridged_heights(z: np.ndarray) -> np.ndarray:
@@ -222,14 +251,17 @@ def _disc(radius: int) -> np.ndarray:
     return x * x + y * y <= radius * radius
 
 
-def _lowest(o: DenseOutcome, coarse: Grid) -> np.ndarray:
-    """(rows, columns) m, the lowest height in every coarse cell, NaN where there is none."""
+def _lowest(o: DenseOutcome, coarse: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, columns) m, the lowest height in every coarse cell, NaN where there is none; share of it with heights."""
+    count = np.zeros((coarse.rows, coarse.columns))
     out = np.full((coarse.rows, coarse.columns), np.inf)
     step = round(coarse.cell_x / o.grid.cell_x)
     for window, tile in o.files.read_all(list(o.windows)):
         row, column = np.nonzero(np.isfinite(tile.z))
-        np.minimum.at(out, ((window.row + row) // step, (window.column + column) // step), tile.z[row, column])
-    return np.where(np.isfinite(out), out, np.nan)
+        at = (window.row + row) // step, (window.column + column) // step
+        np.minimum.at(out, at, tile.z[row, column])
+        np.add.at(count, at, 1.0)
+    return np.where(np.isfinite(out), out, np.nan), count / step**2
 
 
 def _without_low_errors(z: np.ndarray, cell: float) -> np.ndarray:
