@@ -3,8 +3,8 @@
 The simple morphological filter [L: Pingel, Clarke, McBride 2013] on the lowest heights of coarse cells tells where
 ground is; the fine cells near that ground are kept as measured. What is left open is bridged by triangles between the
 ground around it: below objects that were measured, and across holes that heights surround, not beyond the outline of
-the surface. How wrong a bridge is by its distance from the ground is measured on the ground itself: discs of it
-are taken out, bridged and compared; a power law leads from their distances to all [D].
+the surface. The coarse cells are worked through block by block; of the whole area is held only which of them were
+measured, since a way from outside may lead through all of it.
 """
 
 from __future__ import annotations
@@ -14,29 +14,29 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator
 from scipy.ndimage import (
     binary_dilation,
-    binary_erosion,
     binary_fill_holes,
     distance_transform_edt,
     grey_opening,
     map_coordinates,
 )
-from scipy.spatial import QhullError
 
 from aerotri.conventions import InputError
 from aerotri.memory import refuse_beyond_memory
 from aerotri.rasters.grids import Grid
-from aerotri.terrain.dense.tile_files import TileWindow
-from aerotri.terrain.surface import (
-    LEAST_POWER,
-    MOST_POWER,
-    SMRF_HEIGHT_M,
-    SMRF_SCALE,
-    SMRF_SLOPE,
-    ground_cells,
+from aerotri.terrain.dense.bridging import (
+    BridgeLaw,
+    DiscErrors,
+    away_from,
+    bridge_law,
+    bridged_heights,
+    disc,
+    disc_errors,
 )
+from aerotri.terrain.dense.ground_blocks import Block, BlockFiles, ground_blocks, part
+from aerotri.terrain.dense.tile_files import TileWindow
+from aerotri.terrain.surface import SMRF_HEIGHT_M, SMRF_SCALE, ground_cells
 
 if TYPE_CHECKING:
     from aerotri.terrain.dense.measure import DenseOutcome
@@ -47,29 +47,15 @@ LOW_SLOPE = 5.0
 """Slope beyond which a lone low cell is an error: that of filters.smrf."""
 BLUR_CELLS = 3
 """Fine cells beside an object that are no ground: half a window of the matching is two, its smoothing one more."""
-BYTES_OF_CELL = 200
-"""Of a coarse cell, held as a whole."""
-RADII = (1, 2, 4, 8)
-"""Of the discs that are taken out to measure bridges, coarse cells."""
-FEWEST_BRIDGED = 30
+BYTES_OF_CELL = 12
+"""Of a coarse cell, held as a whole: what was measured, what is outside, and both while the way outside is sought."""
+BYTES_OF_BLOCK_CELL = 200
+"""Of a coarse cell of the block that is worked on."""
 MEASURED_SHARE = 0.5
 """Of the fine cells of a coarse one from which the way from outside ends there; chosen [C]: lone matches by chance on
 water or in leaves do not close a bay."""
 MEASURED, BRIDGED = 1, 2
 """Where a height of the ground comes from; 0 where there is none."""
-
-
-@dataclass(frozen=True)
-class BridgeLaw:
-    """RMS error of a bridge: at_1_m · distance^power, m, from the ground; discs : that were taken out to measure it."""
-
-    at_1_m: float
-    power: float
-    discs: int
-
-    def sigma(self, distance: np.ndarray) -> np.ndarray:
-        """m, at distances, m."""
-        return self.at_1_m * np.asarray(distance, float) ** self.power
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,19 +73,18 @@ class BareGround:
 
     Parameters
     ----------
-    outcome : the surface. widest : m, of an object. lowest : (rows, columns) m, the filter's own ground on the coarse
-        grid, without holes; z : the mean ground, bridged, NaN where nothing is known; sigma : m, of matching at the
-        nearest ground; away : m, from the ground. law : of bridges.
-    beyond : (rows, columns) bool, coarse cells outside the surface and their neighbours.
+    outcome : the surface. widest : m, of an object. grid : of the coarse cells.
+    blocks : of every tile. files : of a block: lowest, m, the filter's own ground, without holes; z, m, the mean
+        ground, bridged, NaN where nothing is known; sigma, m, of matching at the nearest ground; away, m, from the
+        ground.
+    law : of bridges. beyond : (rows, columns) bool, coarse cells outside the surface and their neighbours.
     """
 
     outcome: DenseOutcome
     widest: float
     grid: Grid
-    lowest: np.ndarray
-    z: np.ndarray
-    sigma: np.ndarray
-    away: np.ndarray
+    blocks: dict[TileWindow, Block]
+    files: BlockFiles
     law: BridgeLaw
     beyond: np.ndarray
 
@@ -110,13 +95,21 @@ class BareGround:
 
     def measured(self, window: TileWindow) -> np.ndarray:
         """(rows, columns) bool, cells of a tile that are ground."""
-        return _ground_of_tile(self.outcome, window, self.grid, self.lowest)[2]
+        return self._found(window)[0][2]
+
+    def _found(self, window: TileWindow) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], TileWindow, np.ndarray]:
+        """As `_ground_of_tile`, the coarse cells about the tile, and what is known of them."""
+        block = self.blocks[window]
+        about = _about(window, self.grid, self.outcome.grid, block)
+        cells = self.files.read(block, about)
+        return _ground_of_tile(self.outcome, window, block, self.grid, about, cells["lowest"]), about, cells
 
     def _tile(self, window: TileWindow) -> GroundTile:
-        o = self.outcome
-        z, sigma, ground = _ground_of_tile(o, window, self.grid, self.lowest)
-        grid = o.grid.window(window.row, window.column, window.rows, window.columns)
-        bridge, of_rim, away = (_between(self.grid, values, grid) for values in (self.z, self.sigma, self.away))
+        (z, sigma, ground), about, cells = self._found(window)
+        grid = self.outcome.grid.window(window.row, window.column, window.rows, window.columns)
+        bridge, of_rim, away = (
+            _between(self.grid, about, cells[name], self.outcome.grid, window) for name in ("z", "sigma", "away")
+        )
         away = np.maximum(away, 0.5 * grid.cell_x)
         inside = np.isfinite(z) | ~self._coarse(self.beyond, window)
         open_ = ~ground & np.isfinite(bridge) & inside
@@ -127,7 +120,7 @@ class BareGround:
 
     def _coarse(self, values: np.ndarray, window: TileWindow) -> np.ndarray:
         """Values of the coarse cells that the cells of a tile lie in."""
-        step = round(self.grid.cell_x / self.outcome.grid.cell_x)
+        step = _step(self.grid, self.outcome.grid)
         row, column = (np.arange(first, first + count) // step for first, count in (
             (window.row, window.rows), (window.column, window.columns)))  # fmt: skip
         return values[np.ix_(row, column)]
@@ -147,22 +140,38 @@ def bare_ground(outcome: DenseOutcome, widest: float) -> BareGround:
     """
     o = outcome
     coarse = o.grid.coarser(max(round(COARSE_M / o.grid.cell_x), 1))
+    blocks = ground_blocks(o.windows, coarse, _step(coarse, o.grid), widest)
+    of_block = max(block.wide.rows * block.wide.columns for block in blocks)
     refuse_beyond_memory(
-        BYTES_OF_CELL * coarse.rows * coarse.columns, f"the ground of {coarse.rows} × {coarse.columns} cells",
+        BYTES_OF_CELL * coarse.rows * coarse.columns + BYTES_OF_BLOCK_CELL * of_block,
+        f"the ground of {coarse.rows} × {coarse.columns} cells",
         "give an --area, one part of the block after the other",
     )  # fmt: skip
-    lowest, share = _lowest(o, coarse)
+    measured, errors, files = np.zeros((coarse.rows, coarse.columns), bool), [], BlockFiles()
+    for block in blocks:
+        lowest, share = _lowest(o, block, coarse)
+        own = part(block.own, block.wide)
+        measured[part(block.own, TileWindow(0, 0, *measured.shape))] = share[own] >= MEASURED_SHARE
+        errors.append(_worked_out(o, block, coarse, lowest, widest, files))
     # a fine cell without a height may be outside in a coarse cell that has heights, so the neighbours count as well
-    beyond = np.asarray(binary_dilation(outside(share >= MEASURED_SHARE), np.ones((3, 3), bool)), bool)
-    lowest = _without_low_errors(lowest, coarse.cell_x)
-    kept = ground_cells(lowest, coarse.cell_x, widest=widest)
-    lowest = filled(np.where(kept, lowest, np.nan))
-    z, sigma = _means(o, coarse, lowest)
+    beyond = np.asarray(binary_dilation(outside(measured), np.ones((3, 3), bool)), bool)
+    of_tile = {window: block for block in blocks for window in block.tiles}
+    return BareGround(o, widest, coarse, of_tile, files, bridge_law(errors), beyond)
+
+
+def _worked_out(
+    o: DenseOutcome, block: Block, coarse: Grid, lowest: np.ndarray, widest: float, files: BlockFiles
+) -> DiscErrors:
+    """Write what is known of the coarse cells of a block, from their lowest heights; the errors of its bridges."""
+    cell, first = coarse.cell_x, (block.wide.row, block.wide.column)
+    lowest = _without_low_errors(lowest, cell)
+    lowest = filled(np.where(ground_cells(lowest, cell, widest=widest), lowest, np.nan))
+    z, sigma = _means(o, block, coarse, lowest)
     known = np.isfinite(z)
-    law = bridge_law(z, coarse.cell_x, widest)
-    away = _away(known, coarse.cell_x)
-    bridged = np.where(away <= 0.5 * widest, bridged_heights(z), np.nan)
-    return BareGround(o, widest, coarse, lowest, np.where(known, z, bridged), filled(sigma), away, law, beyond)
+    away = away_from(known, cell)
+    bridged = np.where(known, z, np.where(away <= 0.5 * widest, bridged_heights(z, first), np.nan))
+    files.write(block, lowest=lowest, z=bridged, sigma=filled(sigma), away=away)
+    return disc_errors(z, cell, widest, first, block.own_cells())
 
 
 def outside(measured: np.ndarray) -> np.ndarray:
@@ -170,95 +179,27 @@ def outside(measured: np.ndarray) -> np.ndarray:
     return ~np.asarray(binary_fill_holes(measured), bool)
 
 
-def bridged_heights(z: np.ndarray) -> np.ndarray:
-    """(rows, columns) m, heights with their holes (NaN) bridged by triangles between the cells around them.
-
-    NaN remains beyond the outline of what is known.
-    """
-    known = np.isfinite(z)
-    rim = known & binary_dilation(~known, np.ones((3, 3), bool))
-    rows, columns = np.nonzero(rim)
-    if known.all() or len(rows) < 3:
-        return z.copy()
-    out = z.copy()
-    try:
-        out[~known] = LinearNDInterpolator(np.column_stack([rows, columns]), z[rim])(np.argwhere(~known))
-    except QhullError:  # all on one line
-        return z.copy()
-    return out
+def _step(coarse: Grid, fine: Grid) -> int:
+    """Fine cells a side of a coarse one."""
+    return round(coarse.cell_x / fine.cell_x)
 
 
-def bridge_law(z: np.ndarray, cell: float, widest: float) -> BridgeLaw:
-    """How wrong bridges are by their distance from the ground, from discs of ground that are taken out and bridged.
-
-    Where too little ground is whole, the slope that the filter takes for ground, 15 %, is the error.
-
-    Parameters
-    ----------
-    z : (rows, columns) m, ground, NaN where it is not known. cell : m.
-    """
-    known = np.isfinite(z)
-    distances, errors, discs = [], [], 0
-    for radius in (r for r in RADII if (2 * r + 1) * cell <= max(widest, 3.0 * cell)):
-        taken = _discs(known, radius)
-        if not taken.any():
-            continue
-        error = bridged_heights(np.where(taken, np.nan, z)) - z
-        told = taken & np.isfinite(error)
-        distances.append(_away(known & ~taken, cell)[told])
-        errors.append(error[told])
-        discs += int(_middles(known, radius).sum())
-    if discs < FEWEST_BRIDGED:
-        return BridgeLaw(SMRF_SLOPE, 1.0, discs)
-    return _power_law(np.concatenate(distances), np.concatenate(errors), discs)
+def _fine(wide: TileWindow, step: int, grid: Grid) -> TileWindow:
+    """The fine cells of coarse ones."""
+    row, column = wide.row * step, wide.column * step
+    end, right = min((wide.row + wide.rows) * step, grid.rows), min((wide.column + wide.columns) * step, grid.columns)
+    return TileWindow(row, column, end - row, right - column)
 
 
-def _power_law(distance: np.ndarray, error: np.ndarray, discs: int) -> BridgeLaw:
-    """By least squares through the logarithms of RMS errors at equal distances, weighted by their number."""
-    at, place = np.unique(np.round(distance, 6), return_inverse=True)
-    count = np.bincount(place)
-    rms = np.sqrt(np.maximum(np.bincount(place, error**2) / count, 1e-12))
-    x, y, w = np.log(at), np.log(rms), count / count.sum()
-    dx, dy = x - w @ x, y - w @ y
-    spread = float(w @ dx**2)
-    power = float(np.clip(w @ (dx * dy) / spread, LEAST_POWER, MOST_POWER)) if spread > 1e-12 else 1.0
-    scale = float(np.sqrt((count @ rms**2) / (count @ at ** (2.0 * power))))
-    return BridgeLaw(scale, power, discs)
-
-
-def _away(known: np.ndarray, cell: float) -> np.ndarray:
-    """(rows, columns) m, distance from the nearest known cell."""
-    if not known.any():
-        return np.full(known.shape, np.inf)
-    return np.asarray(distance_transform_edt(~known), float) * cell
-
-
-def _middles(known: np.ndarray, radius: int) -> np.ndarray:
-    """Cells of a lattice about which a disc and the cells around it are known."""
-    whole = binary_erosion(known, _disc(radius + 1))
-    every = np.zeros(known.shape, bool)
-    every[:: 4 * radius, :: 4 * radius] = True
-    return whole & every
-
-
-def _discs(known: np.ndarray, radius: int) -> np.ndarray:
-    middles = _middles(known, radius)
-    return np.asarray(binary_dilation(middles, _disc(radius)), bool) if middles.any() else middles
-
-
-def _disc(radius: int) -> np.ndarray:
-    y, x = np.mgrid[-radius : radius + 1, -radius : radius + 1]
-    return x * x + y * y <= radius * radius
-
-
-def _lowest(o: DenseOutcome, coarse: Grid) -> tuple[np.ndarray, np.ndarray]:
+def _lowest(o: DenseOutcome, block: Block, coarse: Grid) -> tuple[np.ndarray, np.ndarray]:
     """(rows, columns) m, the lowest height in every coarse cell, NaN where there is none; share of it with heights."""
-    count = np.zeros((coarse.rows, coarse.columns))
-    out = np.full((coarse.rows, coarse.columns), np.inf)
-    step = round(coarse.cell_x / o.grid.cell_x)
-    for window, tile in o.files.read_all(list(o.windows)):
-        row, column = np.nonzero(np.isfinite(tile.z))
-        at = (window.row + row) // step, (window.column + column) // step
+    shape, step = (block.wide.rows, block.wide.columns), _step(coarse, o.grid)
+    count, out, fine = np.zeros(shape), np.full(shape, np.inf), _fine(block.wide, step, o.grid)
+    for window, tile in o.files.read_all(list(block.near)):
+        rows, columns = part(fine, window)
+        row, column = np.nonzero(np.isfinite(tile.z[rows, columns]))
+        row, column = row + rows.start, column + columns.start
+        at = (window.row + row) // step - block.wide.row, (window.column + column) // step - block.wide.column
         np.minimum.at(out, at, tile.z[row, column])
         np.add.at(count, at, 1.0)
     return np.where(np.isfinite(out), out, np.nan), count / step**2
@@ -269,58 +210,82 @@ def _without_low_errors(z: np.ndarray, cell: float) -> np.ndarray:
     if not np.isfinite(z).any():
         return z
     above = -filled(z)
-    return np.where(above - grey_opening(above, footprint=_disc(1)) > LOW_SLOPE * cell, np.nan, z)
+    return np.where(above - grey_opening(above, footprint=disc(1)) > LOW_SLOPE * cell, np.nan, z)
 
 
-def _means(o: DenseOutcome, coarse: Grid, lowest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean height and mean σ of the ground in every coarse cell, m."""
-    shape, step = (coarse.rows, coarse.columns), round(coarse.cell_x / o.grid.cell_x)
+def _means(o: DenseOutcome, block: Block, coarse: Grid, lowest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean height and mean σ of the ground in every coarse cell of a block, m."""
+    shape, step = lowest.shape, _step(coarse, o.grid)
     count, height, spread = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    for window in o.windows:
-        z, sigma, ground = _ground_of_tile(o, window, coarse, lowest)
+    fine = _fine(block.wide, step, o.grid)
+    for tile in block.near:
+        rows, columns = part(tile, fine)
+        window = TileWindow(
+            fine.row + rows.start, fine.column + columns.start, rows.stop - rows.start, columns.stop - columns.start
+        )
+        about = _about(window, coarse, o.grid, block)
+        z, sigma, ground = _ground_of_tile(o, window, block, coarse, about, lowest[part(about, block.wide)])
         row, column = np.nonzero(ground)
-        at = (window.row + row) // step, (window.column + column) // step
+        at = (window.row + row) // step - block.wide.row, (window.column + column) // step - block.wide.column
         for total, values in ((count, 1.0), (height, z[row, column]), (spread, sigma[row, column])):
             np.add.at(total, at, values)
     with np.errstate(invalid="ignore"):
         return height / count, spread / count
 
 
+def _about(window: TileWindow, coarse: Grid, fine: Grid, block: Block) -> TileWindow:
+    """The coarse cells that the slope about a tile and what lies beside it depends on."""
+    step, wide = _step(coarse, fine), block.wide
+    first = [(start - BLUR_CELLS) // step - 2 for start in (window.row, window.column)]
+    ends = window.row + window.rows, window.column + window.columns
+    last = [(end + BLUR_CELLS - 1) // step + 3 for end in ends]
+    row, column = max(first[0], wide.row), max(first[1], wide.column)
+    end, right = min(last[0], wide.row + wide.rows), min(last[1], wide.column + wide.columns)
+    return TileWindow(row, column, end - row, right - column)
+
+
 def _ground_of_tile(
-    o: DenseOutcome, window: TileWindow, coarse: Grid, lowest: np.ndarray
+    o: DenseOutcome, window: TileWindow, block: Block, coarse: Grid, about: TileWindow, lowest: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Heights and σ of matching, m, of a tile, and whether each cell is ground."""
+    """Heights and σ of matching, m, of a tile, and whether each cell is ground.
+
+    Parameters
+    ----------
+    lowest : (rows, columns) m, of the coarse cells `about` the tile.
+    """
     b = BLUR_CELLS
-    first = max(window.row - b, 0), max(window.column - b, 0)
-    last = min(window.row + window.rows + b, o.grid.rows), min(window.column + window.columns + b, o.grid.columns)
-    z, sigma = (np.full((last[0] - first[0], last[1] - first[1]), np.nan) for _ in range(2))
-    for other in o.windows:
-        top, left = max(other.row, first[0]), max(other.column, first[1])
-        end, right = min(other.row + other.rows, last[0]), min(other.column + other.columns, last[1])
-        if top >= end or left >= right:
+    row, column = max(window.row - b, 0), max(window.column - b, 0)
+    end, right = min(window.row + window.rows + b, o.grid.rows), min(window.column + window.columns + b, o.grid.columns)
+    wide = TileWindow(row, column, end - row, right - column)
+    z, sigma = _heights(o, wide, block.near)
+    known = np.isfinite(z)
+    slope = np.hypot(*np.gradient(lowest, coarse.cell_x)) if min(lowest.shape) > 1 else np.zeros(lowest.shape)
+    bound = SMRF_HEIGHT_M + SMRF_SCALE * _between(coarse, about, slope, o.grid, wide) * coarse.cell_x
+    near = known & (np.abs(z - _between(coarse, about, lowest, o.grid, wide)) <= bound)
+    beside = np.asarray(binary_dilation(known & ~near, disc(b)), bool)
+    own = part(window, wide)
+    return z[own], sigma[own], (near & ~beside)[own]
+
+
+def _heights(o: DenseOutcome, window: TileWindow, near: tuple[TileWindow, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Heights and σ of matching, m, of a window of the fine cells, from the tiles that meet it."""
+    z, sigma = (np.full((window.rows, window.columns), np.nan) for _ in range(2))
+    for other in near:
+        to, source = part(other, window), part(window, other)
+        if any(side.start >= side.stop for side in to):
             continue
         tile = o.files.read(other)
         if tile is None:
             raise InputError("was removed while ground was sought", "run the command again", o.files.path(other))
-        to = np.s_[top - first[0] : end - first[0], left - first[1] : right - first[1]]
-        source = np.s_[top - other.row : end - other.row, left - other.column : right - other.column]
         z[to], sigma[to] = tile.z[source], tile.sigma[source]
-    grid = o.grid.window(first[0], first[1], *z.shape)
-    known = np.isfinite(z)
-    slope = np.hypot(*np.gradient(lowest, coarse.cell_x)) if min(lowest.shape) > 1 else np.zeros(lowest.shape)
-    bound = SMRF_HEIGHT_M + SMRF_SCALE * _between(coarse, slope, grid) * coarse.cell_x
-    near = known & (np.abs(z - _between(coarse, lowest, grid)) <= bound)
-    beside = np.asarray(binary_dilation(known & ~near, _disc(b)), bool)
-    ground = near & ~beside
-    own = np.s_[window.row - first[0] :, window.column - first[1] :]
-    z, sigma, ground = (values[own][: window.rows, : window.columns] for values in (z, sigma, ground))
-    return z, sigma, ground
+    return z, sigma
 
 
-def _between(coarse: Grid, values: np.ndarray, grid: Grid) -> np.ndarray:
-    """(rows, columns) of a finer grid, bilinear."""
+def _between(coarse: Grid, about: TileWindow, values: np.ndarray, fine: Grid, window: TileWindow) -> np.ndarray:
+    """(rows, columns) of a window of the fine cells, bilinear between values of the coarse cells `about` it."""
+    grid = fine.window(window.row, window.column, window.rows, window.columns)
     row, column = coarse.row(grid.y(np.arange(grid.rows))), coarse.column(grid.x(np.arange(grid.columns)))
-    at = np.meshgrid(row, column, indexing="ij")
+    at = np.meshgrid(row - about.row, column - about.column, indexing="ij")
     return map_coordinates(values, at, order=1, mode="nearest")
 
 
