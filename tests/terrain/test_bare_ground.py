@@ -1,5 +1,6 @@
 """Ground of a dense surface: objects taken off, bridges with a σ that grows across them."""
 
+import tracemalloc
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,11 +9,8 @@ from rendered_blocks import rendered_block
 from scipy.ndimage import gaussian_filter
 
 from aerotri.rasters.grids import Grid
-from aerotri.terrain.dense.bare_ground import (
-    BRIDGED,
-    MEASURED,
-    bare_ground,
-)
+from aerotri.terrain.dense import ground_blocks
+from aerotri.terrain.dense.bare_ground import BRIDGED, BYTES_OF_BLOCK_CELL, BYTES_OF_CELL, MEASURED, bare_ground
 from aerotri.terrain.dense.bridging import MOVED, bridge_law, bridged_heights, disc_errors
 from aerotri.terrain.dense.measure import DensePlan, measure_surface
 from aerotri.terrain.dense.tile_files import TileFiles, tile_windows
@@ -22,10 +20,10 @@ from aerotri.terrain.pickets import Area
 SIDE, CELL, NOISE_M = 480, 0.25, 0.05
 
 
-def outcome_of(folder, z):
+def outcome_of(folder, z, side=200):
     """What of a measured surface the filter looks at, in tiles."""
     grid = Grid(*z.shape, 500.0, 900.0, CELL, CELL)
-    files, windows = TileFiles(folder, 0), tile_windows(grid, 200)
+    files, windows = TileFiles(folder, 0), tile_windows(grid, side)
     for w in windows:
         part = z[w.row : w.row + w.rows, w.column : w.column + w.columns]
         known = np.isfinite(part)
@@ -201,3 +199,67 @@ def test_a_ring_is_bridged_unless_it_leads_outside(tmp_path):
     z[(np.abs(row - 20.0) < 2.0) & (column > 28.0)] = np.nan
     open_ = bare_ground(outcome_of(tmp_path, z), 18.0)
     assert not sum(int((tile.source == BRIDGED).sum()) for _, tile in open_.tiles())
+
+
+def strip(rng, shape):
+    """Rolling ground with houses, trees and holes everywhere, but for a frame that is whole."""
+    z = 50.0 + 40.0 * gaussian_filter(rng.normal(size=shape), 30.0, mode="wrap")
+    row, column = np.mgrid[: shape[0], : shape[1]] * CELL
+    high, wide = shape[0] * CELL, shape[1] * CELL
+    for _ in range(shape[1] // 25):
+        y, x = rng.uniform(9.0, high - 9.0), rng.uniform(9.0, wide - 9.0)
+        z[(np.abs(row - y) < rng.uniform(2.0, 6.0)) & (np.abs(column - x) < rng.uniform(2.0, 6.0))] += 6.0
+        y, x = rng.uniform(9.0, high - 9.0), rng.uniform(9.0, wide - 9.0)
+        z[np.hypot(row - y, column - x) < rng.uniform(0.5, 4.0)] = np.nan
+    return z + rng.normal(scale=NOISE_M, size=shape)
+
+
+def test_the_ground_does_not_depend_on_how_it_is_divided(tmp_path, monkeypatch):
+    o = outcome_of(tmp_path, strip(np.random.default_rng(12), (220, 1700)))
+    whole = bare_ground(o, 18.0)
+    assert len(set(whole.blocks.values())) == 1
+    monkeypatch.setattr(ground_blocks, "BLOCK_CELLS", 47)
+    divided = bare_ground(o, 18.0)
+    blocks = set(divided.blocks.values())
+    assert len(blocks) > 5
+    assert max(block.wide.columns for block in blocks) < 0.6 * divided.grid.columns
+    assert divided.law.discs == whole.law.discs > 30
+    assert (divided.law.at_1_m, divided.law.power) == pytest.approx((whole.law.at_1_m, whole.law.power), rel=1e-9)
+    bridged = 0
+    for (window, one), (_, other) in zip(whole.tiles(), divided.tiles(), strict=True):
+        np.testing.assert_array_equal(one.source, other.source)
+        np.testing.assert_array_equal(whole.measured(window), divided.measured(window))
+        np.testing.assert_allclose(one.z, other.z, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(one.sigma, other.sigma, rtol=1e-9)
+        bridged += int((one.source == BRIDGED).sum())
+    assert bridged > 20_000
+
+
+def test_a_way_from_outside_leads_through_all_blocks(tmp_path, monkeypatch):
+    """A bay through the whole strip stays open, far from where it leads outside."""
+    z = np.full((220, 1700), 50.0)
+    z[100:124, 100:] = np.nan
+    monkeypatch.setattr(ground_blocks, "BLOCK_CELLS", 100)
+    found = bare_ground(outcome_of(tmp_path, z), 18.0)
+    assert not any((tile.source == BRIDGED).any() for _, tile in found.tiles())
+    z[100:124, 1600:] = 50.0
+    closed = bare_ground(outcome_of(tmp_path, z), 18.0)
+    bridged = sum(int((tile.source == BRIDGED).sum()) for _, tile in closed.tiles())
+    assert bridged == 24 * 1500
+
+
+def test_memory_is_what_is_foretold(tmp_path, monkeypatch):
+    """A large area of coarse cells, of which hardly anything but one block is held."""
+    z = np.tile(strip(np.random.default_rng(3), (480, 480))[::4, ::4], (5, 5))
+    o = outcome_of(tmp_path, z, 50)
+    o.grid = Grid(*z.shape, 0.0, 0.0, 1.0, 1.0)
+    monkeypatch.setattr(ground_blocks, "BLOCK_CELLS", 100)
+    tracemalloc.start()
+    try:
+        found = bare_ground(o, 6.0)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    block = max(b.wide.rows * b.wide.columns for b in found.blocks.values())
+    assert most < BYTES_OF_CELL * z.size + BYTES_OF_BLOCK_CELL * block
+    assert most < 0.1 * BYTES_OF_BLOCK_CELL * z.size

@@ -7,6 +7,7 @@ import tempfile
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +69,7 @@ def ground_blocks(tiles: Sequence[TileWindow], coarse: Grid, step: int, widest: 
         start = np.maximum(np.vstack([first[mine], low]).min(axis=0) - margin, 0)
         end = np.minimum(np.vstack([last[mine], high]).max(axis=0) + margin, size)
         near = ((first < end) & (last > start)).all(axis=1)
-        own_tiles, others = (tuple(tiles[n] for n in np.flatnonzero(which)) for which in (mine, near))
+        own_tiles, others = (tuple(compress(tiles, which)) for which in (mine, near))
         found.append(Block(_window(low, high), _window(start, end), own_tiles, others))
     return found
 
