@@ -47,10 +47,10 @@ LOW_SLOPE = 5.0
 """Slope beyond which a lone low cell is an error: that of filters.smrf."""
 BLUR_CELLS = 3
 """Fine cells beside an object that are no ground: half a window of the matching is two, its smoothing one more."""
-BYTES_OF_CELL = 12
-"""Of a coarse cell, held as a whole: what was measured, what is outside, and both while the way outside is sought."""
-BYTES_OF_BLOCK_CELL = 200
-"""Of a coarse cell of the block that is worked on."""
+BYTES_OF_CELL = 6
+"""Of a coarse cell, held as a whole: whether it was measured, and what the way from outside is sought with."""
+BYTES_OF_BLOCK_CELL = 400
+"""Of a coarse cell of the block that is worked on; most are triangles across the discs that are taken out."""
 MEASURED_SHARE = 0.5
 """Of the fine cells of a coarse one from which the way from outside ends there; chosen [C]: lone matches by chance on
 water or in leaves do not close a bay."""

@@ -18,12 +18,13 @@ from aerotri.terrain.surface import LEAST_POWER, MOST_POWER, SMRF_SLOPE
 RADII = (1, 2, 4, 8)
 """Of the discs that are taken out to measure bridges, coarse cells."""
 FEWEST_BRIDGED = 30
-MOVED = 1e-5
+MOVED = 1e-4
 """Cells by which corners of triangles are moved, each by its own number; chosen [C]: four corners on one circle have
-two triangulations, and which of them is taken must not depend on what else is triangulated. Heights change by the
-slope times as much."""
-BESIDE_HULL = 10.0 * MOVED
-"""Of a triangle's height: cells so little beyond the outline lie on it but for the moving."""
+two triangulations, and which of them is taken must not depend on what else is triangulated. Moved by a tenth of it,
+Qhull still took some of them for equal. Heights change by the slope times as much."""
+BESIDE_HULL = 2.0 * MOVED
+"""Of the height of a triangle of at least 0.7 cells: so little beyond the outline a cell lies on it but for the
+moving."""
 CELLS_AT_A_TIME = 100_000
 """That are bridged, so that their triangles take little memory; chosen [C]: 20 MB."""
 

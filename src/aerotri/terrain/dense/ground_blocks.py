@@ -16,8 +16,8 @@ from aerotri.rasters.grids import Grid
 from aerotri.terrain.dense.tile_files import TileWindow
 
 BLOCK_CELLS = 1000
-"""Coarse cells of a side; chosen [C]: 200 bytes of each are 0.3 GB with the margin, and the margin of the widest
-object that is usual, 18 m, adds a quarter to the work."""
+"""Coarse cells of a side; chosen [C]: 400 bytes of each are 0.5 GB with the margin, which adds a quarter to the work
+where the widest object is 18 m and cells 1 m."""
 REACH = 3.0
 """Margin of a block, in widest objects; chosen [C]: the opening by the largest disc reaches one, the nearest ground and
 the nearest height below an object or across a hole that is bridged half of one each, triangles one more."""
