@@ -86,7 +86,7 @@ def test_photographs_become_a_volume(shown):
     """In one line and step by step the same surface, and the same volume to what a cell of the raster holds."""
     cells, folder = shown
     page = value(cells["run"], "text/html")
-    assert page.count("<td>done</td>") == 6
+    assert page.count("<td>done</td>") == 7
     verdict, _, place, measured = eval(value(cells["verdict"]))
     assert (verdict, place, measured) == ("accepted", "photographs_project", True)
     assert (folder / place / "report.html").is_file()

@@ -32,6 +32,8 @@ LEAST_LIMIT = 2.5e-4
 """Share of white that differences may always have [C]: where photographs are free of noise."""
 FEWEST_CELLS = 10
 """Of a pair of photographs [C]."""
+MOST_OF_PAIR = 1000
+"""Cells of a pair of photographs that are taken [C]: gains are good to a few thousandths with them."""
 NOISE = 1e-3
 """Least standard deviation of colours, share of white [C]: one without any texture says nothing about gains."""
 CORRELATED_CELLS = 25.0
@@ -214,7 +216,21 @@ def _pairs(candidates: Candidates, band: int) -> _Pairs:
         first.append(one[usable].astype(float))
         second.append(other[usable].astype(float))
     which, at = _numbered(np.concatenate(keys), count * count)
-    return _Pairs(which // count, which % count, at, np.concatenate(first), np.concatenate(second))
+    some = _evenly(at, len(which))
+    x, y = np.concatenate(first)[some], np.concatenate(second)[some]
+    return _Pairs(which // count, which % count, at[some], x, y)
+
+
+def _evenly(at: np.ndarray, n: int) -> np.ndarray:
+    """(m,) bool, some of the cells of every pair, evenly, where it has more than are taken."""
+    size = np.bincount(at, minlength=n)
+    every = -(-size // MOST_OF_PAIR)
+    if (every <= 1).all():
+        return np.ones(len(at), bool)
+    order = np.argsort(at, kind="stable")
+    rank = np.empty(len(at), np.intp)
+    rank[order] = np.arange(len(at)) - np.repeat(np.cumsum(size) - size, size)
+    return rank % every[at] == 0
 
 
 def _numbered(values: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
