@@ -18,6 +18,7 @@ from aerotri.reference.plan_files import plan_files
 from aerotri.reference.printed import printed_contents
 from aerotri.reference.records import DescribedFile
 from aerotri.reference.terrain_files import terrain_files
+from aerotri.reference.volume_files import volume_files
 
 
 @cache
@@ -32,6 +33,7 @@ def described_files() -> tuple[DescribedFile, ...]:
         *accuracy_files(),
         *image_error_files(),
         *terrain_files(),
+        *volume_files(),
         *ortho_files(),
         *change_files(),
         *plan_files(),
