@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
+
+import aerotri
+from aerotri.formats.block.folder import write_block
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.observations import Block
+from aerotri.rasters.grids import Grid
 from aerotri.simulation import Truth, parse_spec, simulate
 
 ERRING = {"camera": {"ucd": {"preset": "ultracam_d", "errors": {"physical": {"rms_um": 4.0, "seed": 2}}}}}
@@ -51,3 +57,16 @@ def with_adjustment(block: Block, **settings) -> Block:
     """The block with other settings of its adjustment."""
     adjustment = replace(block.settings.adjustment, **settings)
     return replace(block, settings=replace(block.settings, adjustment=adjustment))
+
+
+def adjusted_place(folder: Path, cell: float, count: int) -> tuple[Grid, np.ndarray, np.ndarray, np.ndarray]:
+    """A square of cells in the middle of a block whose result is written: its grid, (x, y) of its middle, m, and
+    (rows, columns) how far cells lie east and north of it."""
+    block, truth = small_block(5, "bluh:1-12")
+    write_block(block, folder / "block")
+    aerotri.adjust(folder / "block").save(folder / "result", plots=False)
+    middle = np.round(np.median(truth.centre[:, :2], axis=0))
+    half = cell * count / 2.0
+    grid = Grid(count, count, middle[0] - half, middle[1] + half, cell, cell)
+    x, y = np.meshgrid(grid.x(np.arange(count)) - middle[0], grid.y(np.arange(count)) - middle[1])
+    return grid, middle, x, y

@@ -9,13 +9,12 @@ import pytest
 import shapely
 
 import aerotri
-from aerotri.formats.block.folder import write_block
 from aerotri.public.cell_noise import noise_of_dense
-from aerotri.rasters.grids import Grid, RasterReader
+from aerotri.rasters.grids import RasterReader
 from aerotri.rasters.surface_files import write_raster_parts, write_surface_parts
 from aerotri.terrain.dense.bare_ground import BRIDGED, MEASURED
 from aerotri.terrain.dense.tile_files import TileWindow
-from small_blocks import small_block
+from small_blocks import adjusted_place
 
 CELL, COUNT, NOISE, LENGTH, ADJUSTMENT, BRIDGE = 2.0, 120, 0.04, 7.0, 0.2, 0.3
 HOUSES = ((20, 30, 40, 60), (20, 90, 30, 100), (80, 30, 100, 50))
@@ -46,13 +45,7 @@ def write_dense(folder, grid, surface, ground, houses):
 def place(tmp_path_factory):
     """Houses on rolling ground, the same without any, and the result they were measured in."""
     folder = tmp_path_factory.mktemp("ground")
-    block, truth = small_block(5, "bluh:1-12")
-    write_block(block, folder / "block")
-    aerotri.adjust(folder / "block").save(folder / "result", plots=False)
-    middle = np.round(np.median(truth.centre[:, :2], axis=0))
-    half = CELL * COUNT / 2.0
-    grid = Grid(COUNT, COUNT, middle[0] - half, middle[1] + half, CELL, CELL)
-    x, y = np.meshgrid(grid.x(np.arange(COUNT)) - middle[0], grid.y(np.arange(COUNT)) - middle[1])
+    grid, _, x, y = adjusted_place(folder, CELL, COUNT)
     ground = 100.0 + 0.02 * x + np.sin(x / 20.0) * np.cos(y / 20.0)
     surface = ground.copy()
     for top, left, bottom, right in HOUSES:

@@ -13,11 +13,10 @@ import shapely
 import aerotri
 from aerotri import InputError
 from aerotri.commands.volume import VolumeInput, run_volume
-from aerotri.formats.block.folder import write_block
-from aerotri.rasters.grids import Grid, RasterReader
+from aerotri.rasters.grids import RasterReader
 from aerotri.rasters.surface_files import write_raster_parts, write_surface_parts
 from aerotri.volume.settings import SectionPlan, SigmaOptions
-from small_blocks import small_block
+from small_blocks import adjusted_place
 
 CELL, COUNT, NOISE, LENGTH = 2.0, 120, 0.04, 7.0
 
@@ -26,13 +25,7 @@ CELL, COUNT, NOISE, LENGTH = 2.0, 120, 0.04, 7.0
 def place(tmp_path_factory):
     """Two heaps on ground that slopes, as `aerotri dsm` writes them, with the block they were measured in."""
     folder = tmp_path_factory.mktemp("piles")
-    block, truth = small_block(5, "bluh:1-12")
-    write_block(block, folder / "block")
-    aerotri.adjust(folder / "block").save(folder / "result", plots=False)
-    middle = np.round(np.median(truth.centre[:, :2], axis=0))
-    half = CELL * COUNT / 2.0
-    grid = Grid(COUNT, COUNT, middle[0] - half, middle[1] + half, CELL, CELL)
-    x, y = np.meshgrid(grid.x(np.arange(COUNT)) - middle[0], grid.y(np.arange(COUNT)) - middle[1])
+    grid, middle, x, y = adjusted_place(folder, CELL, COUNT)
     z = 100.0 + 0.02 * x
     for at, high in ((-60.0, 12.0), (60.0, 8.0)):
         z += np.maximum(high * (1.0 - np.hypot(x - at, y) / 35.0), 0.0)
