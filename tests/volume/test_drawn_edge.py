@@ -8,6 +8,7 @@ from aerotri.rasters.grids import Grid
 from aerotri.volume.accuracy import boundary_variance
 from aerotri.volume.bases import parse_base, quadrature_of
 from aerotri.volume.boundary import boundary_of
+from aerotri.volume.regions import Region
 
 SIGMA, MOVED, PANELS = 0.1, 0.2, 60
 
@@ -27,16 +28,38 @@ def outline(radius=9.0, corners=6):
     return np.column_stack([radius * np.cos(angle), 0.8 * radius * np.sin(angle)])
 
 
-def volume(rings, text):
+def over_base(rings, text):
+    """Boundary, base, places with what they stand for, and heights over the base there."""
     boundary = boundary_of(shapely.Polygon(rings[0], rings[1:]), "drawn")
     base = parse_base(text, Hill(), boundary)
     places, weight = quadrature_of(boundary, PANELS)
-    return float(weight @ (Hill().sample(*places.T) - base.heights(*places.T)))
+    return boundary, base, places, weight, Hill().sample(*places.T) - base.heights(*places.T)
 
 
-def stated(rings, text):
-    boundary = boundary_of(shapely.Polygon(rings[0], rings[1:]), "drawn")
-    return np.sqrt(boundary_variance(Hill(), parse_base(text, Hill(), boundary), boundary, SIGMA))
+def volume(rings, text, sign=0):
+    weight, d = over_base(rings, text)[3:]
+    return float(weight @ (np.maximum(sign * d, 0.0) if sign else d))
+
+
+def stated(rings, text, sign=0):
+    boundary, base, places, weight, d = over_base(rings, text)
+    counts = sign * d > 0.0
+    region = Region(places[counts], weight[counts], sign) if sign else None
+    return np.sqrt(boundary_variance(Hill(), base, boundary, SIGMA, sign, region))
+
+
+def by_differences(rings, text, sign=0):
+    """σ, m³, by moving one corner after the other."""
+    total = 0.0
+    for k, ring in enumerate(rings):
+        for at in np.ndindex(ring.shape):
+            pair = []
+            for move in (-MOVED, MOVED):
+                moved = [one.copy() for one in rings]
+                moved[k][at] += move
+                pair.append(volume(moved, text, sign))
+            total += ((pair[1] - pair[0]) / (2.0 * MOVED)) ** 2
+    return SIGMA * np.sqrt(total)
 
 
 @pytest.mark.parametrize(("base", "holes"), [("boundary", 0), ("boundary", 1), ("plane", 1), ("level:100", 1)])
@@ -46,16 +69,15 @@ def test_corners_moved_one_by_one(base, holes):
     Moved by less, the places along the outline, which are spaced anew, make a difference of their own.
     """
     rings = [outline(), outline(2.0, 3)][: 1 + holes]
-    total = 0.0
-    for k, ring in enumerate(rings):
-        for at in np.ndindex(ring.shape):
-            pair = []
-            for move in (-MOVED, MOVED):
-                moved = [one.copy() for one in rings]
-                moved[k][at] += move
-                pair.append(volume(moved, base))
-            total += ((pair[1] - pair[0]) / (2.0 * MOVED)) ** 2
-    assert stated(rings, base) == pytest.approx(SIGMA * np.sqrt(total), rel=0.2)
+    assert stated(rings, base) == pytest.approx(by_differences(rings, base), rel=0.2)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_of_a_cut_and_of_a_fill(sign):
+    """A plane through an outline on a flank cuts the ground; where it rises the cut shrinks and the fill grows."""
+    rings = [outline(14.0)]
+    assert volume(rings, "plane", sign) > 5.0
+    assert stated(rings, "plane", sign) == pytest.approx(by_differences(rings, "plane", sign), rel=0.2)
 
 
 def test_lowest_place_may_become_another_one():

@@ -48,13 +48,12 @@ def boundary_variance(
     if nodes is None:
         return sigma**2 * float(np.sum(by_corner**2))
     step = max(sigma, surface.grid.cell_x, surface.grid.cell_y)
+    # where the base rises a fill becomes larger, what is above it smaller
+    above = -1.0 if sign < 0 else 1.0
     if len(nodes.xy) == 1:
-        return _with_lowest(surface, boundary, sigma, by_corner, float(nodes.integral[0]), step)
-    by_nodes = _by_nodes(surface, base, nodes, step)
-    if isinstance(base, SplineBase):
-        over = quadrature_of(boundary) if region is None else (region.places, region.weight)
-        by_nodes += by_places_of_kernels(base, *over)
-    by_corner -= _to_corners(nodes.xy, by_nodes, rings)
+        return _with_lowest(surface, boundary, sigma, by_corner, above * float(nodes.integral[0]), step)
+    over = quadrature_of(boundary) if region is None else (region.places, region.weight)
+    by_corner -= above * _to_corners(nodes.xy, _by_nodes(surface, base, nodes, step, over), rings)
     return sigma**2 * float(np.sum(by_corner**2))
 
 
@@ -78,19 +77,24 @@ def _by_area(surface: Surface, base: Base, rings: list[np.ndarray], sign: int) -
     return np.concatenate(found)
 
 
-def _by_nodes(surface: Surface, base: Base, nodes: Nodes, step: float) -> np.ndarray:
+def _by_nodes(
+    surface: Surface, base: Base, nodes: Nodes, step: float, over: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
     """(k, 2) m², of ∫ of the base by the places that it follows from, as these move over the surface.
 
     [D] A place that moves by δ has δ·∇z another height; where it was, the base changes by δ·(∇z − ∇base). The plane
-    nearest to many heights also turns where one that is r above it moves: by N⁻¹(0, δ)·r, N its normal matrix.
+    nearest to many heights also turns where one that is r above it moves: by N⁻¹(0, δ)·r, N its normal matrix; what
+    a spline does besides: `by_places_of_kernels`.
     That the places are spaced evenly along the outline again is left out.
 
     Parameters
     ----------
-    step : m, to either side, for slopes.
+    step : m, to either side, for slopes. over : places (q, 2) m and weights (q,) m² of the integral.
     """
     found = nodes.integral[:, None] * _slopes(surface, base, nodes.xy, step)
-    if isinstance(base, PlaneBase) and len(nodes.xy) > 1:
+    if isinstance(base, SplineBase):
+        found += by_places_of_kernels(base, *over)
+    elif isinstance(base, PlaneBase):
         design = np.column_stack([np.ones(len(nodes.xy)), nodes.xy - nodes.xy.mean(axis=0)])
         turned = np.linalg.solve(design.T @ design, design.T @ nodes.integral)[1:]
         found += _over_base(surface, base, nodes.xy)[:, None] * turned
@@ -116,7 +120,7 @@ def _with_lowest(
 
     Parameters
     ----------
-    by_corner : (corners, 2) m², of the area. area : m², over which the base counts.
+    by_corner : (corners, 2) m², of the area. area : m², over which the base counts; less than 0 of a fill.
     """
     places, rings = boundary_heights(surface, boundary), boundary.rings
     xy, z = places[:, :2], places[:, 2]
