@@ -31,7 +31,9 @@ def environment(tmp_path, monkeypatch):
     """A module with a kernel, and an empty folder for what is compiled."""
     (tmp_path / "here.py").write_text(KERNELS)
     path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
-    return {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept"), "PYTHONPATH": path}
+    # Python tells sources by whole seconds and their size: one that is changed at once would be read as it was
+    python = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
+    return {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept"), **python}
 
 
 def begun(environment, *line) -> subprocess.Popen:
