@@ -15,6 +15,8 @@ from aerotri.bench.session import Bench
 from small_blocks import small_block
 
 pytest.importorskip("starlette", reason="the bench takes the extra 'view'")
+# whether every row of the table names a photograph or point
+ONLY = "name => [...document.querySelectorAll('#rays tbody tr')].every(r => r.innerText.includes(name))"
 HOSTILE = ("<img src=x onerror=document.title='hacked'>", '"><script>alert(1)</script>', "a & b 'c' Größe")
 
 
@@ -233,10 +235,7 @@ def test_hostile_names_stay_text(chromium, tmp_path):
         for name in HOSTILE:
             p.fill("#filter", name)
             p.press("#filter", "Enter")
-            p.wait_for_function(
-                "name => [...document.querySelectorAll('#rays tbody tr')].every(r => r.innerText.includes(name))",
-                arg=name,
-            )
+            p.wait_for_function(ONLY, arg=name)
             p.click("#rays tbody tr:first-child")
             p.click("#tab-point")
             p.click("#tab-rays")
@@ -246,6 +245,58 @@ def test_hostile_names_stay_text(chromium, tmp_path):
         assert watched.hosts <= {"127.0.0.1", "data:"}
         p.close()
     bench.wait()
+
+
+def test_text_being_typed_outlives_a_table_drawn_anew(page):
+    p = page.page
+    every = p.locator("#rays tbody tr").count()
+    name = texts(p, "#rays tbody tr:first-child td")[3]
+    p.click("#filter")
+    p.keyboard.type(name[:-1])
+    # as when a photograph has come, or the equations are ready
+    p.evaluate("bench.showTab()")
+    p.keyboard.type(name[-1])
+    assert p.input_value("#filter") == name
+    p.keyboard.press("Enter")
+    p.wait_for_function(ONLY, arg=name)
+    assert 0 < p.locator("#rays tbody tr").count() < every
+    p.click("#tab-point")
+    p.click("#tab-rays")
+    p.wait_for_selector("#rays tbody tr")
+    assert p.input_value("#filter") == name
+
+
+def test_late_answer_does_not_write_over_a_later_one(page):
+    p = page.page
+    every = p.locator("#rays tbody tr").count()
+    name = texts(p, "#rays tbody tr:first-child td")[3]
+    held = []
+    p.route("**/data/rays*", lambda route: route.continue_() if held else held.append(route))
+    p.evaluate("void bench.showTab()")
+    while not held:
+        p.wait_for_timeout(20)
+    p.fill("#filter", name)
+    p.press("#filter", "Enter")
+    p.wait_for_function(ONLY, arg=name)
+    with p.expect_response("**/data/rays*"):
+        held[0].continue_()
+    p.wait_for_timeout(200)
+    assert 0 < p.locator("#rays tbody tr").count() < every
+
+
+def test_reason_is_given_once(page, bench):
+    p = page.page
+    p.click("#rays tbody tr:first-child")
+    p.click("#tab-point")
+    p.click("#reason")
+    p.keyboard.type("bl")
+    p.evaluate("bench.showTab()")
+    p.keyboard.type("urred")
+    p.click("#ray-off")
+    p.wait_for_selector("body[data-changes='1']")
+    assert bench.measuring.decisions.rows[0].reason == "blurred"
+    # what the field shows is what the next decision is given
+    assert p.input_value("#reason") == ""
 
 
 @pytest.fixture(scope="module")

@@ -39,6 +39,19 @@ export function say(text) {
   if (text) say.timer = setTimeout(() => { place.hidden = true; }, 12000);
 }
 
+// The field in which somebody types, and how to give it back when the elements around it were made anew.
+export function fieldHeld(parent) {
+  const field = document.activeElement;
+  if (!field || !field.id || !parent.contains(field)) return () => {};
+  const selected = [field.selectionStart, field.selectionEnd];
+  return () => {
+    const now = document.getElementById(field.id);
+    if (!now || !parent.contains(now)) return;
+    now.focus({ preventScroll: true });
+    if (typeof selected[0] === "number") now.setSelectionRange(...selected);
+  };
+}
+
 // An action whose error is told to the user, not lost.
 export function guarded(action) {
   return async (...given) => {

@@ -1,7 +1,7 @@
 // The bench: what is chosen, what was decided, and which part of the page shows it.
 
 import { ask, tell } from "./api.js";
-import { button, fixed, guarded, make, say } from "./dom.js";
+import { button, fieldHeld, fixed, guarded, make, say } from "./dom.js";
 import { Photo } from "./photo.js";
 import { Plan } from "./plan.js";
 import { PointSheet } from "./point.js";
@@ -106,9 +106,11 @@ class Bench {
     this.tab = name;
     this.drawTabs();
     // a page of its own: an answer that comes late must not write over another tab
-    const page = make("div", { class: "page" });
-    document.getElementById("sheet").replaceChildren(page);
-    await this.tabs[name][1].render(page);
+    const page = make("div", { class: "page" }), sheet = document.getElementById("sheet"), giveBack = fieldHeld(sheet);
+    sheet.replaceChildren(page);
+    const drawn = this.tabs[name][1].render(page);
+    giveBack();
+    await drawn;
   }
 
   async wanted(layer) {

@@ -33,13 +33,22 @@ export class PointSheet {
     const { image } = this.bench.chosen, measured = image !== null && this.bench.isMeasured(image, found);
     const reason = make("input", { id: "reason", list: "reasons", placeholder: "reason", value: this.reason, oninput: event => { this.reason = event.target.value; } });
     const words = make("datalist", { id: "reasons" }, ...REASONS.map(value => make("option", { value })));
-    const decide = (text, id, work, title) => { const made = button(text, async () => { await work(); this.reason = ""; }, title); made.id = id; return made; };
-    const choose = (whole, action) => () => this.bench.switch(whole ? null : image, found.name, action, this.reason);
+    // the reason goes with one decision; where that fails it stays
+    const decide = (text, id, work, title) => {
+      const made = button(text, async () => {
+        const reason = this.reason;
+        this.reason = "";
+        try { await work(reason); } catch (error) { this.reason = reason; throw error; }
+      }, title);
+      made.id = id;
+      return made;
+    };
+    const choose = (whole, action) => reason => this.bench.switch(whole ? null : image, found.name, action, reason);
     const off = whole => this.bench.switchOf(whole ? null : image, found.point) === "off";
     const made = [];
     if (measured) {
       made.push(decide(off(false) ? "ray on" : "ray off", "ray-off", choose(false, off(false) ? "on" : "off"), "The ray in the chosen photograph"));
-      made.push(decide("remove mark", "remove-mark", () => this.bench.removeMark(image, found.name, this.reason), "The mark in the chosen photograph"));
+      made.push(decide("remove mark", "remove-mark", reason => this.bench.removeMark(image, found.name, reason), "The mark in the chosen photograph"));
     }
     made.push(decide(off(true) ? "point on" : "point off", "point-off", choose(true, off(true) ? "on" : "off"), found.given ? "Its given coordinates" : "All its rays"));
     if (found.given) {

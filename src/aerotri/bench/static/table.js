@@ -3,29 +3,47 @@
 import { ask } from "./api.js";
 import { button, fixed, guarded, make } from "./dom.js";
 
+const STEP = 500;
+
+// What the user works with is made once and stays: a field in which somebody types must not be replaced.
 export class RayTable {
   constructor(bench) {
     this.bench = bench;
     this.filter = "";
-    this.only = false;
     this.first = 0;
+    this.asked = 0;
+    const apply = guarded(() => this.apply()), turn = by => () => { this.first = Math.max(0, this.first + by); return this.fill(); };
+    this.input = make("input", { type: "search", id: "filter", placeholder: "photograph or point", onchange: apply, onkeydown: event => { if (event.key === "Enter") apply(); } });
+    this.only = make("input", { type: "checkbox", onchange: guarded(() => { this.first = 0; return this.fill(); }) });
+    this.back = button("◂", turn(-STEP), "rows before");
+    this.on = button("▸", turn(STEP), "rows after");
+    this.shown = make("span");
+    this.rows = make("div");
   }
 
   async render(sheet) {
-    const chosen = this.bench.chosen, question = { first: this.first, text: this.filter };
-    if (this.only && chosen.point !== null) question.point = chosen.point;
+    sheet.replaceChildren(make("div", { class: "tools" }, this.input, make("label", {}, this.only, " of the chosen point"), this.back, this.on, this.shown), this.rows);
+    await this.fill();
+  }
+
+  // Leaving the field and Enter both say so: the rows are asked for once.
+  async apply() {
+    if (this.input.value === this.filter) return;
+    this.filter = this.input.value;
+    this.first = 0;
+    await this.fill();
+  }
+
+  // Answers may come in another order than the questions: the last question counts.
+  async fill() {
+    const asked = ++this.asked, { point } = this.bench.chosen, question = { first: this.first, text: this.filter };
+    if (this.only.checked && point !== null) question.point = point;
     const found = await ask("data/rays", question);
-    const rows = found.rows, step = 500;
-    const input = make("input", { type: "search", id: "filter", placeholder: "photograph or point", value: this.filter, onchange: guarded(async event => {
-      this.filter = event.target.value; this.first = 0; await this.render(sheet); }) });
-    const only = make("label", {}, make("input", { type: "checkbox", checked: this.only, onchange: guarded(async event => {
-      this.only = event.target.checked; this.first = 0; await this.render(sheet); }) }), " of the chosen point");
-    const turn = by => async () => { this.first = Math.max(0, this.first + by); await this.render(sheet); };
-    const back = button("◂", turn(-step), "rows before"), on = button("▸", turn(step), "rows after");
-    back.disabled = !this.first;
-    on.disabled = this.first + step >= found.count;
-    const shown = `${found.count ? found.first + 1 : 0}–${Math.min(found.first + step, found.count)} of ${found.count} rays, the largest |w| first`;
-    sheet.replaceChildren(make("div", { class: "tools" }, input, only, back, on, make("span", {}, shown)), this.table(rows));
+    if (asked !== this.asked) return;
+    this.back.disabled = !this.first;
+    this.on.disabled = this.first + STEP >= found.count;
+    this.shown.textContent = `${found.count ? found.first + 1 : 0}–${Math.min(found.first + STEP, found.count)} of ${found.count} rays, the largest |w| first`;
+    this.rows.replaceChildren(this.table(found.rows));
   }
 
   table(rows) {
