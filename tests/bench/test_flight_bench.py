@@ -128,10 +128,14 @@ def test_page_in_a_browser(folder):
         assert "is not a number" in p.inner_text("#message")
         p.fill("#field-gsd", "0.04")
         p.click("#again")
+        p.wait_for_selector("body[data-job='running'], body[data-generation='2']")
+        p.fill("#field-direction", "30")
         p.wait_for_selector("body[data-generation='2']", timeout=120_000)
+        assert p.input_value("#field-direction") == "30"  # typed while the plan was made
         assert "plan_001" in p.inner_text("#numbers thead")
         p.select_option("#actions select", "pit_plan")
         p.wait_for_selector("body[data-generation='3']")
+        assert p.input_value("#field-direction") != "30"
         assert p.title() == f"{HOSTILE} – aerotri plan"
         assert watched.errors == []
         assert watched.hosts <= {"127.0.0.1", "data:"}

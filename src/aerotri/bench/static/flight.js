@@ -52,12 +52,19 @@ class FlightBench {
     document.getElementById("actions").replaceChildren(plans, again);
   }
 
+  // Made once. What was typed since a plan was asked for stays when that plan comes.
   fields() {
-    const inputs = FIELDS.map(([name, words, placeholder]) => make("label", {}, make("span", {}, words),
-      make("input", { name, id: `field-${name}`, value: this.summary.fields[name], placeholder: placeholder || "" })));
-    const form = document.getElementById("fields");
-    form.replaceChildren(...inputs);
-    form.onsubmit = event => { event.preventDefault(); guarded(() => this.again())(); };
+    const form = document.getElementById("fields"), { fields } = this.summary;
+    if (!form.children.length) {
+      form.replaceChildren(...FIELDS.map(([name, words, placeholder]) => make("label", {}, make("span", {}, words),
+        make("input", { name, id: `field-${name}`, placeholder: placeholder || "" }))));
+      form.onsubmit = event => { event.preventDefault(); guarded(() => this.again())(); };
+    }
+    for (const [name] of FIELDS) {
+      const input = document.getElementById(`field-${name}`);
+      if (!this.asked || input.value === this.asked[name]) input.value = fields[name] ?? "";
+    }
+    this.asked = null;
     form.hidden = !this.summary.can_plan;
   }
 
@@ -82,12 +89,14 @@ class FlightBench {
 
   async again() {
     const fields = Object.fromEntries([...document.querySelectorAll("#fields input")].map(input => [input.name, input.value]));
+    this.asked = fields;
     await tell("act/again", { fields });
     await this.look();
   }
 
   async choose(plan) {
     await tell("act/choose", { plan });
+    this.asked = null;
     await this.look();
   }
 
