@@ -7,6 +7,7 @@ import struct
 import tokenize
 import zipfile
 import zlib
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +19,13 @@ WHAT_DAMAGE_RAISES = (
 """zipfile, zlib and numpy.lib.format, from the directory of an archive to the last byte of an array."""
 
 
-def kept_arrays(path: Path) -> dict[str, np.ndarray] | None:
-    """The arrays of an archive (.npz) as they were written; None where it is missing or damaged."""
+def kept_arrays(path: Path, only: Collection[str] | None = None) -> dict[str, np.ndarray] | None:
+    """The arrays of an archive (.npz) as they were written, all or some; None where it is missing or damaged."""
     try:
         with zipfile.ZipFile(path) as archive:
             # read to its end a member is compared with its checksum, whatever size the header of the array announces
-            whole = {name.removesuffix(".npy"): archive.read(name) for name in archive.namelist()}
+            names = archive.namelist() if only is None else [f"{name}.npy" for name in only]
+            whole = {name.removesuffix(".npy"): archive.read(name) for name in names}
         return {n: np.lib.format.read_array(io.BytesIO(b), allow_pickle=False) for n, b in whole.items()}
     except WHAT_DAMAGE_RAISES:
         return None

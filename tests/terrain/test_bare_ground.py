@@ -14,7 +14,7 @@ from aerotri.terrain.dense.bare_ground import BRIDGED, BYTES_OF_BLOCK_CELL, BYTE
 from aerotri.terrain.dense.bridging import MOVED, bridge_law, bridged_heights, disc_errors
 from aerotri.terrain.dense.measure import DensePlan, measure_surface
 from aerotri.terrain.dense.tile_files import TileFiles, tile_windows
-from aerotri.terrain.dense.tile_surface import TileSurface
+from aerotri.terrain.dense.tile_surface import TileSurface, rim_of
 from aerotri.terrain.pickets import Area
 
 SIDE, CELL, NOISE_M = 480, 0.25, 0.05
@@ -23,13 +23,13 @@ SIDE, CELL, NOISE_M = 480, 0.25, 0.05
 def outcome_of(folder, z, side=200):
     """What of a measured surface the filter looks at, in tiles."""
     grid = Grid(*z.shape, 500.0, 900.0, CELL, CELL)
-    files, windows = TileFiles(folder, 0), tile_windows(grid, side)
+    files, windows = TileFiles(folder, 0, side), tile_windows(grid, side)
     for w in windows:
         part = z[w.row : w.row + w.rows, w.column : w.column + w.columns]
         known = np.isfinite(part)
         sigma = np.where(known, NOISE_M, np.nan)
         empty = np.zeros((0, 2), int), np.zeros(0), np.nan, np.nan
-        tile = TileSurface(part, sigma, known.astype(np.uint64), np.array([0]), 1.0, *empty)
+        tile = TileSurface(part, sigma, known.astype(np.uint64), np.array([0]), 1.0, *empty, rim_of(part, 0))
         files.write(w, tile)
     return SimpleNamespace(grid=grid, files=files, windows=tuple(windows))
 

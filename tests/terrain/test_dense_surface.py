@@ -40,7 +40,7 @@ from aerotri.terrain.dense.steps import (
     straightness,
 )
 from aerotri.terrain.dense.tile_files import TileFiles, TileWindow
-from aerotri.terrain.dense.tile_surface import TileSurface
+from aerotri.terrain.dense.tile_surface import TileSurface, rim_of
 from aerotri.terrain.pickets import Area
 
 
@@ -126,7 +126,7 @@ def test_medians_keep_few_cells_in_memory(monkeypatch):
             z, members = np.full(shape, 100.0), np.full(shape, 3, np.uint8)
             sigma = np.full(shape, 0.1 if n % 3 else 0.2)
             pairs = np.array([[0, 1]])
-            yield window, TileSurface(z, sigma, members, pairs[0], 1.0, pairs, np.zeros(1), 2.0, 3.0)
+            yield window, TileSurface(z, sigma, members, pairs[0], 1.0, pairs, np.zeros(1), 2.0, 3.0, rim_of(z, 0))
 
     nodes = np.zeros((2, 2, 6))
     nodes[:, :, 2] = 0.05**2
@@ -174,8 +174,9 @@ def test_no_damage_of_a_kept_tile_outlives_the_next_run(tmp_path):
     """Whatever byte is wrong, the tile counts as not there, or is what it was."""
     rng = np.random.default_rng(2)
     z, count = rng.normal(100.0, 1.0, (3, 4)), rng.integers(0, 5, (3, 4))
-    tile = TileSurface(z, z / 1e3, count, count[0], 1.5, count[:, :2], z[0], 2.5, 0.7)
-    files, window = TileFiles(tmp_path, 0), TileWindow(0, 0, 3, 4)
+    rim = rim_of(rng.normal(100.0, 1.0, (5, 6)), 1)
+    tile = TileSurface(z, z / 1e3, count, count[0], 1.5, count[:, :2], z[0], 2.5, 0.7, rim)
+    files, window = TileFiles(tmp_path, 0, 3), TileWindow(0, 0, 3, 4)
     files.write(window, tile)
     whole = files.path(window).read_bytes()
     refused = 0
@@ -186,6 +187,7 @@ def test_no_damage_of_a_kept_tile_outlives_the_next_run(tmp_path):
         if read is not None:
             np.testing.assert_array_equal(read.z, tile.z)
             np.testing.assert_array_equal(read.pairs, tile.pairs)
+            np.testing.assert_array_equal(read.rim.below, rim.below)
             assert (read.factor, read.shared_cells, read.pixel) == (1.5, 2.5, 0.7)
     assert refused > 0.5 * len(whole)
 

@@ -274,7 +274,7 @@ def _heights(o: DenseOutcome, window: TileWindow, near: tuple[TileWindow, ...]) 
         to, source = part(other, window), part(window, other)
         if any(side.start >= side.stop for side in to):
             continue
-        tile = o.files.read(other)
+        tile = o.files.read_joined(other)
         if tile is None:
             raise InputError("was removed while ground was sought", "run the command again", o.files.path(other))
         z[to], sigma[to] = tile.z[source], tile.sigma[source]

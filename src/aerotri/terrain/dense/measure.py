@@ -158,8 +158,8 @@ def _measured(calibration: Adjustment, plan: DensePlan, tell: Report, executor: 
             photographs, store, area, heights, plan, coarsest, gsd, executor, partial(tell, "coarse surface")
         )
     grid = grid_of_area(area, cell)
-    files = TileFiles(plan.folder, finest)
-    windows = tile_windows(grid, tile_side(grid, gsd, finest))
+    side = tile_side(grid, gsd, finest)
+    files, windows = TileFiles(plan.folder, finest, side), tile_windows(grid, side)
     options = TileOptions(finest, plan.pairs, plan.edge)
     work = TileWork(photographs, store, grid, heights, options, files)
     resumed = do_windows(work, windows, executor, partial(tell, "surface"))
@@ -209,8 +209,8 @@ def _coarse(
         BYTES_OF_CELL * grid.rows * grid.columns, f"a coarse surface of {grid.rows} × {grid.columns} cells",
         "give an --area, one part of the block after the other",
     )  # fmt: skip
-    files = TileFiles(plan.folder, level)
-    windows = tile_windows(grid, tile_side(grid, gsd, level))
+    side = tile_side(grid, gsd, level)
+    files, windows = TileFiles(plan.folder, level, side), tile_windows(grid, side)
     options = TileOptions(level, COARSE_PAIRS, plan.edge)
     do_windows(TileWork(photographs, store, grid, heights, options, files), windows, executor, report)
     z = np.full((grid.rows, grid.columns), np.nan, np.float32)

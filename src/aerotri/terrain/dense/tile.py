@@ -19,7 +19,7 @@ from aerotri.terrain.dense.pairs import Candidate, Pair, chosen_pairs, noise_cor
 from aerotri.terrain.dense.parallaxes import Parallaxes, parallaxes_of
 from aerotri.terrain.dense.place import Place, place_at
 from aerotri.terrain.dense.scratch import scratch
-from aerotri.terrain.dense.tile_surface import TileSurface, empty_tile
+from aerotri.terrain.dense.tile_surface import TileSurface, empty_tile, rim_of
 from aerotri.terrain.photographs import Photographs
 
 LARGEST_JUMP_PX = 1.5
@@ -36,8 +36,8 @@ SMALLEST_PATCH, PATCH_STEP_PX = 50, 2.0
 """Cells of a patch of surface below which it is taken for chance, and the step, in pixels of parallax, that bounds it;
 chosen [C]: five by ten cells, the size of a window of the matching and its neighbours."""
 MARGIN_PX = 16.0
-"""By which a tile is measured beyond its edge, where steps and patches that reach into it are looked for; less than
-what epipolar images have besides."""
+"""By which a tile is measured beyond its edge, where steps and patches that reach into it are looked for, and where it
+goes over into its neighbour; less than what epipolar images have besides."""
 MOST_LAGS = 12
 """Cells up to which the noise of neighbouring cells is looked at for what they share."""
 SLOW_CELLS = 2 * MOST_LAGS + 1
@@ -97,8 +97,9 @@ def measure_tile(
     z, sigma, members = (a[spare:-spare, spare:-spare].copy() for a in maps)
     across = np.array([m.across for m in matched])
     return TileSurface(
-        z + middle[2], sigma, members, np.array(shown), factor, numbers, across, shared_cells, scale.pixel
-    )
+        z + middle[2], sigma, members, np.array(shown), factor, numbers, across, shared_cells, scale.pixel,
+        rim_of(maps[0] + middle[2], spare),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

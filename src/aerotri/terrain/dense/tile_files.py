@@ -12,9 +12,11 @@ import numpy as np
 
 from aerotri.kept_arrays import kept_arrays
 from aerotri.rasters.grids import Grid
-from aerotri.terrain.dense.tile_surface import TileSurface
+from aerotri.terrain.dense.joining import SIDES, joined
+from aerotri.terrain.dense.tile_surface import TileRim, TileSurface
 
-FIELDS = ("z", "sigma", "members", "photographs", "factor", "pairs", "across", "shared_cells", "pixel")
+RIM = ("above", "below", "before", "behind")
+FIELDS = ("z", "sigma", "members", "photographs", "factor", "pairs", "across", "shared_cells", "pixel", *RIM)
 
 
 @dataclass(frozen=True)
@@ -39,14 +41,18 @@ def tile_windows(grid: Grid, side: int) -> list[TileWindow]:
 
 @dataclass(frozen=True)
 class TileFiles:
-    """The tiles of one level in a folder."""
+    """The tiles of one level in a folder; side : cells of a tile, but for the last of a row or column."""
 
     folder: Path
     level: int
+    side: int
 
     def path(self, window: TileWindow) -> Path:
         """Where a tile is, or will be."""
-        return self.folder / f"level{self.level}_{window.row}_{window.column}.npz"
+        return self._path(window.row, window.column)
+
+    def _path(self, row: int, column: int) -> Path:
+        return self.folder / f"level{self.level}_{row}_{column}.npz"
 
     def write(self, window: TileWindow, tile: TileSurface) -> None:
         """Write a tile whole or not at all."""
@@ -60,6 +66,7 @@ class TileFiles:
                 photographs=tile.photographs.astype(np.int64), factor=np.array(tile.factor),
                 pairs=tile.pairs.astype(np.int64), across=tile.across.astype(np.float64),
                 shared_cells=np.array(tile.shared_cells), pixel=np.array(tile.pixel),
+                **{name: getattr(tile.rim, name) for name in RIM},
             )  # fmt: skip
         os.replace(part, path)
 
@@ -70,8 +77,21 @@ class TileFiles:
             return None
         return TileSurface(
             parts["z"], parts["sigma"], parts["members"], parts["photographs"], float(parts["factor"]), parts["pairs"],
-            parts["across"], float(parts["shared_cells"]), float(parts["pixel"]),
+            parts["across"], float(parts["shared_cells"]), float(parts["pixel"]), TileRim(*(parts[r] for r in RIM)),
         )  # fmt: skip
+
+    def read_joined(self, window: TileWindow) -> TileSurface | None:
+        """A tile that goes over into its neighbours, as far as these are there; None where it is not there itself."""
+        tile = self.read(window)
+        if tile is None:
+            return None
+        rims = {}
+        for down, right in SIDES:
+            row, column = window.row + down * self.side, window.column + right * self.side
+            parts = kept_arrays(self._path(row, column), RIM)
+            if parts is not None:
+                rims[down, right] = TileRim(*(parts[name] for name in RIM))
+        return joined(tile, rims)
 
     def remove_unfinished(self) -> None:
         """Remove what killed workers left of tiles."""
@@ -79,9 +99,9 @@ class TileFiles:
             part.unlink(missing_ok=True)
 
     def read_all(self, windows: list[TileWindow]) -> Iterator[tuple[TileWindow, TileSurface]]:
-        """Tiles one after the other; all must be there."""
+        """Tiles one after the other, each going over into its neighbours; all must be there."""
         for window in windows:
-            tile = self.read(window)
+            tile = self.read_joined(window)
             if tile is None:
                 raise FileNotFoundError(self.path(window))
             yield window, tile

@@ -8,6 +8,33 @@ import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
+class TileRim:
+    """Heights that a tile measured beyond its edges, m of the CRS; NaN where there is none.
+
+    Parameters
+    ----------
+    above, below : (spare, columns + 2 spare), of its rows. before, behind : (rows, spare), of its columns.
+    """
+
+    above: np.ndarray
+    below: np.ndarray
+    before: np.ndarray
+    behind: np.ndarray
+
+    @property
+    def spare(self) -> int:
+        """Cells beyond an edge."""
+        return len(self.above)
+
+
+def rim_of(z: np.ndarray, spare: int) -> TileRim:
+    """Of the heights of a tile with what lies beyond its edges, (rows + 2 spare, columns + 2 spare) m."""
+    own = slice(spare, len(z) - spare)
+    parts = z[:spare], z[len(z) - spare :], z[own, :spare], z[own, z.shape[1] - spare :]
+    return TileRim(*(part.copy() for part in parts))
+
+
+@dataclass(frozen=True, eq=False)
 class TileSurface:
     """Heights of a tile, (rows, columns) m, NaN where there is none.
 
@@ -20,6 +47,7 @@ class TileSurface:
     across : (n,) px, median shift across the base of each.
     shared_cells : cells along a side of the square whose noise is one, as neighbours share it; NaN where not known.
     pixel : m of height that a pixel of parallax is, of the median pair; NaN where nothing was matched.
+    rim : what was measured beyond its edges.
     """
 
     z: np.ndarray
@@ -31,6 +59,7 @@ class TileSurface:
     across: np.ndarray
     shared_cells: float
     pixel: float
+    rim: TileRim
 
     @property
     def count(self) -> np.ndarray:
@@ -62,5 +91,5 @@ def empty_tile(shape: tuple[int, int]) -> TileSurface:
     nothing = np.full(shape, np.nan)
     return TileSurface(
         nothing, nothing.copy(), np.zeros(shape, np.uint64), np.zeros(0, int), 1.0, np.zeros((0, 2), int), np.zeros(0),
-        np.nan, np.nan,
+        np.nan, np.nan, rim_of(nothing, 0),
     )  # fmt: skip
