@@ -8,7 +8,7 @@ import pytest
 from aerotri.diagnosis.moving_errors import model_part_in_words
 from aerotri.pipeline.chain import adjust_keeping_system
 from aerotri.results.model_part import FIELD, GROUPS
-from aerotri.statistics.cluster_fields import field_equations, fitted_field, root_of_field
+from aerotri.statistics.cluster_fields import field_equations, fit_field, fitted_field, root_of_field
 from aerotri.statistics.cluster_test import untestable
 from aerotri.statistics.clusters import Clusters
 from dense_algebra import dense_design
@@ -101,6 +101,20 @@ def test_moving_errors_of_three_strips_are_found_and_their_size_is_right():
     said = model_part_in_words(part)
     assert "3 strips are too few for a comparison" in said
     assert said.endswith("µm in every strip")
+
+
+def test_where_the_iterations_ended_is_no_error_of_the_strips():
+    """Patterns that the unknowns take up nearly whole keep scores of the last iterations, many times their noise."""
+    camera, unit = small_block(seed=1)[0].cameras[0], 0.004
+    for seed in (1, 2, 3):
+        rng = np.random.default_rng(seed)
+        patterns = np.linalg.qr(rng.normal(size=(70, 70)))[0]
+        values = 4e8 * np.concatenate([[1.5e-6, 2.5e-6, 3e-6], np.geomspace(1e-3, 1.0, 67)])
+        z = np.concatenate([[-27.0, 20.0, 5.0], rng.normal(size=67)])
+        normals, scores = (patterns * values) @ patterns.T, patterns @ (np.sqrt(values) * z)
+        field = fit_field(normals, scores, np.zeros(1, int), False, [camera], unit, 1.0)
+        assert np.exp(-0.5 * field.gain) > 1e-3
+        assert field.sigma < unit
 
 
 def test_errors_that_all_strips_share_do_not_move():

@@ -2,8 +2,10 @@
 
 Vertical photographs over flat ground, 8 bits: every photograph is a part of one random texture. With `--relief` they
 are rendered over hills instead, 16 bits, which takes some time. The surface is measured with `aerotri.dense_surface`;
-the time spent in StereoSGBM, of all levels, is taken in the same run. The ratio is one of processor times, so that it
-holds for any number of threads; OpenCV itself has one. A small surface is made before, so that nothing is compiled in
+the time spent in StereoSGBM, of all levels, is taken in the same run. One ratio is of processor times; OpenCV has one
+thread meanwhile. The other is of times by the clock: the surface is measured once more, ours in one thread and OpenCV
+with as many as ours had before, each matching in its turn; the sum of their times is what StereoSGBM alone takes. A
+small surface is made before, so that nothing is compiled in
 the time that counts. Peak memory is that of the whole process; another one makes the photographs. Measures times inside
 the package, so it looks there on purpose.
 
@@ -22,6 +24,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import cv2
@@ -33,8 +37,8 @@ from aerotri.terrain.dense import parallaxes
 
 GSD_M, PIXEL_UM, END_LAP, SIDE_LAP, WAVE_M = 0.1, 6.0, 0.7, 0.4, 100.0
 HEAD = (
-    "| photographs | cells | elapsed s | processor s | StereoSGBM, processor s | ratio | peak memory MB |"
-    " median error px |\n|---|---|---|---|---|---|---|---|"
+    "| photographs | cells | threads | processor s | StereoSGBM, processor s | ratio | elapsed s |"
+    " StereoSGBM, elapsed s | ratio | peak memory MB | median error px |\n|---|---|---|---|---|---|---|---|---|---|---|"
 )
 
 
@@ -108,27 +112,41 @@ def _measured(folder: Path, arguments: argparse.Namespace) -> str:
     folder = folder / "flown" / "photographs" if arguments.relief else folder
     middle = np.array(result.record.result.images.centre).mean(axis=0)
     aerotri.dense_surface(result, folder, area=(middle[0], middle[1], middle[0] + 15.0, middle[1] + 15.0))
+    area = None if arguments.area is None else tuple(arguments.area)
+    start, of_processor = time.perf_counter(), time.process_time()
+    with _timed(time.thread_time) as alone:
+        found = aerotri.dense_surface(result, folder, area=area)
+    whole, of_processor = time.perf_counter() - start, time.process_time() - of_processor
+    error = float(np.median(_errors(found, flight)))
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    os.environ["AEROTRI_THREADS"] = "1"
+    cv2.setNumThreads(arguments.threads)
+    with _timed(time.perf_counter) as by_clock:
+        aerotri.dense_surface(result, folder, area=area)
+    columns, rows = arguments.size
+    photographs = arguments.strips * arguments.photographs
+    return (
+        f"| {photographs} of {columns} × {rows} | {found.record.cells} | {arguments.threads} | {of_processor:.1f} | "
+        f"{sum(alone):.1f} | {of_processor / sum(alone):.2f} | {whole:.1f} | {sum(by_clock):.1f} | "
+        f"{whole / sum(by_clock):.2f} | {memory:.0f} | {error / GSD_M:+.3f} |"
+    )
+
+
+@contextmanager
+def _timed(clock: Callable[[], float]) -> Iterator[list[float]]:
+    """s, of every matching by StereoSGBM meanwhile."""
     spent: list[float] = []
     ours = parallaxes.semi_global
 
     def timed(images):
-        start = time.thread_time()
+        start = clock()
         found = ours(images)
-        spent.append(time.thread_time() - start)
+        spent.append(clock() - start)
         return found
 
     parallaxes.semi_global = timed
-    start, of_processor = time.perf_counter(), time.process_time()
-    found = aerotri.dense_surface(result, folder, area=None if arguments.area is None else tuple(arguments.area))
-    whole, of_processor = time.perf_counter() - start, time.process_time() - of_processor
-    error = float(np.median(_errors(found, flight)))
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    columns, rows = arguments.size
-    photographs = arguments.strips * arguments.photographs
-    return (
-        f"| {photographs} of {columns} × {rows} | {found.record.cells} | {whole:.1f} | {of_processor:.1f} | "
-        f"{sum(spent):.1f} | {of_processor / sum(spent):.2f} | {memory:.0f} | {error / GSD_M:+.3f} |"
-    )
+    yield spent
+    parallaxes.semi_global = ours
 
 
 def _errors(found: DenseSurface, flight: aerotri.SimulatedBlock) -> np.ndarray:

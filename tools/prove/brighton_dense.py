@@ -5,7 +5,8 @@ counts as covered where it has a height. The differences are taken after a rigid
 leaves (no control, GNSS of metres) is in them, and is taken off in the columns that say so. z is the difference without
 bowl over σ of matching (robust σ); the cloud has errors of its own, of which nothing is known. Below the table stands
 what the adjustment says of heights after the alignment, by noise and by what its parameters leave of the camera's
-errors. The same is printed for what OpenCV's semi-global matching alone gives on the same epipolar images and for the
+errors; and by how much heights jump where two tiles meet, which other pairs measure, beside the same inside tiles. The
+table's numbers are printed for what OpenCV's semi-global matching alone gives on the same epipolar images and for the
 surface of pickets. Cells are counted where the two surfaces lie; how many are covered once ours is moved onto the
 cloud, and each of its cells counts for all the cloud's cells that it lies over, stands below the table. --model takes
 another set of parameters, auto the one that the program chooses. Looks inside the package on purpose. Measures: heights
@@ -41,6 +42,8 @@ PER_ROW = 100_000_000
 """Of the numbers of cells: more than there are in a row."""
 HEAD = "| surface | cells | covered | of the cloud's cells | NMAD m | GSD | without bowl, GSD | beyond 0.2 m |"
 HEAD += " σ of matching, GSD | z |"
+LANE, STEP = 100, 4
+"""Cells along a border whose jumps are taken together; between lines inside tiles that are looked at beside it."""
 PLACES = 400
 """Of the surface, where what the adjustment brings is computed."""
 
@@ -154,6 +157,31 @@ def after_alignment(result: aerotri.Adjustment, found: DenseSurface) -> tuple[fl
     return float(noise), float(np.sqrt(np.mean(np.sum((by_errors + j @ left.by_unknowns) ** 2, axis=1))))
 
 
+def jumps(found: DenseSurface, raster: Path) -> tuple[np.ndarray, np.ndarray]:
+    """m, medians over lanes of cells of the jumps at borders of tiles, and inside tiles.
+
+    A jump is the difference of the two cells at a line less the mean of those before and after it.
+    """
+    with rasterio.open(raster) as file:
+        z = file.read(1, masked=True).filled(np.nan).astype(float)
+    o = found.record
+    at, inside = [], []
+    for lines, rows in (({w.column for w in o.windows}, z.T), ({w.row for w in o.windows}, z)):
+        for line in range(2, len(rows) - 1):
+            if line in lines:
+                at.append(of_lanes(rows[line - 2 : line + 2]))
+            elif line % STEP == 0 and all(abs(line - border) > STEP for border in lines):
+                inside.append(of_lanes(rows[line - 2 : line + 2]))
+    return np.concatenate(at), np.concatenate(inside)
+
+
+def of_lanes(z: np.ndarray) -> np.ndarray:
+    """Medians over lanes, half of whose cells are known, of four lines of heights."""
+    jump = z[2] - z[1] - 0.5 * (z[3] - z[2] + z[1] - z[0])
+    lanes = np.split(jump, range(LANE, len(jump), LANE))
+    return np.array([np.nanmedian(lane) for lane in lanes if 2 * np.isfinite(lane).sum() >= LANE])
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path, help="folder for the results")
@@ -191,6 +219,12 @@ def main() -> None:
     print(
         f"After the alignment the adjustment brings {noise / GSD_M:.2f} GSD by noise and {left / GSD_M:.2f} GSD by "
         "what its parameters leave of the errors of the camera."
+    )
+    at, inside = (jumps_ / GSD_M for jumps_ in jumps(dense, out / "dense" / "dsm.tif"))
+    print(
+        f"\nMedians over {LANE} cells of the jumps of heights: {np.sqrt(np.mean(at**2)):.2f} GSD RMS where two tiles "
+        f"meet ({len(at)} places, largest {np.abs(at).max():.2f}), {np.sqrt(np.mean(inside**2)):.2f} inside tiles "
+        f"({len(inside)} places, largest {np.abs(inside).max():.2f})."
     )
 
 

@@ -54,6 +54,8 @@ from aerotri import drawing, geometry, parameters
 SUBSETS = ("even", "odd")
 PIXELS, PIXEL_UM, GSD_M, TRUE_GSD_M = (575, 375), 180.0, 1.8, 0.09
 ERROR_PX, TIE_SIGMA_PX, INTERVAL_PX, TIES, SEED = 0.45, 0.1, 12.0, 1000, 11
+CAMERA = 4
+"""Number that the random image errors of the camera start from."""
 WINDOW_PX = 17
 """Side of the windows that `aerotri.terrain` matches where nothing is stated."""
 SETS = {"1–12, 42–73": "bluh:1-12,ultracam_d:42-73", "42–73, field": "ultracam_d:42-73,collocation"}
@@ -133,13 +135,15 @@ def main() -> None:
         (RESULTS / "paper_003_dem.md").write_text("\n".join([HEAD, "```", *told, "```", TAIL]), encoding="utf-8")
 
 
-def prepare(folder: Path, name: str, noise: float) -> Path:
-    """A rendered block with its adjustments, without additional parameters and with each set."""
+def prepare(folder: Path, name: str, noise: float, camera: int = CAMERA) -> Path:
+    """A rendered block with its adjustments, without additional parameters and with each set; camera : its number."""
     here, plan = folder / name, folder / name / "plan.toml"
     if not (here / "block" / "photographs").exists():
         here.mkdir(parents=True, exist_ok=True)
         tie = TIE_SIGMA_PX * PIXEL_UM * (EXACT if name == "known" else 1.0)
-        told = PLAN.format(name=name, px=PIXELS, pixel=PIXEL_UM, errors=ERRORS[name](), gsd=GSD_M, tie=tie, ties=TIES)
+        told = PLAN.format(
+            name=name, px=PIXELS, pixel=PIXEL_UM, errors=ERRORS[name](camera), gsd=GSD_M, tie=tie, ties=TIES
+        )
         plan.write_text(told, encoding="utf-8")
         aerotri.simulate(plan, SEED).save(here / "block", photographs=True, noise=noise)
     for result, spec in {"plain": "none", **SETS}.items() if name != "perfect" else (("plain", "none"),):
@@ -148,13 +152,19 @@ def prepare(folder: Path, name: str, noise: float) -> Path:
     return here
 
 
-def by_physics() -> str:
-    return f", errors = {{ physical = {{ rms_um = {ERROR_PX * PIXEL_UM:g}, seed = 4 }} }}"
+def without(_: int) -> str:
+    return ""
 
 
-def by_parameters() -> str:
+def by_physics(number: int) -> str:
+    return f", errors = {{ physical = {{ rms_um = {ERROR_PX * PIXEL_UM:g}, seed = {number} }} }}"
+
+
+def by_parameters(number: int) -> str:
     """The values of the paper's parameters that come nearest to the camera that errs by physics."""
-    text = PLAN.format(name="known", px=PIXELS, pixel=PIXEL_UM, errors=by_physics(), gsd=GSD_M, tie=1.0, ties=TIES)
+    text = PLAN.format(
+        name="known", px=PIXELS, pixel=PIXEL_UM, errors=by_physics(number), gsd=GSD_M, tie=1.0, ties=TIES
+    )
     flight = aerotri.simulate(tomllib.loads(text), SEED)
     camera = flight.block.cameras[0]
     true = flight.true_image_errors(nodes=115).field
@@ -165,7 +175,7 @@ def by_parameters() -> str:
     return f", errors = {{ parameters = {{ {pairs} }} }}"
 
 
-ERRORS = {"perfect": str, "erring": by_physics, "known": by_parameters}
+ERRORS = {"perfect": without, "erring": by_physics, "known": by_parameters}
 
 
 def match(here: Path, result: str, name: str, photographs: str = "block/photographs", ideal: bool = False) -> Pair:
@@ -240,23 +250,29 @@ def clear_cells(here: Path, found: Pair) -> np.ndarray:
     A window of 17 pixels is a tenth of a tile of this camera, and 1/200 of one of the true camera.
     """
     result, clear = aerotri.open_result(here / "plain"), np.isfinite(found.difference)
-    images, camera = result.adjusted.images, result.block.cameras[0]
-    rotation = geometry.rotation_from_angles(images.angles, result.block.rotation)
-    lines = np.array(drawing.seams(camera))
     row = {str(name): k for k, name in enumerate(result.block.images.names)}
     for subset, z in zip(SUBSETS, (found.even, found.odd), strict=True):
         names, number = models_of_cells(here, subset, found.grid)
         clear &= maximum_filter(number, 3) == minimum_filter(number, 3)
         for side in (0, 1):
             photo = np.array([row[pair[side]] for pair in names])[number.ravel()]
-            u = np.einsum("nji,nj->ni", rotation[photo], places(found.grid, z) - images.centre[photo])
-            xy = -camera.focal_length_mm * u[:, :2] / u[:, 2:]
-            for axis in (0, 1):
-                # a seam has the same x, or the same y, at both ends
-                seams = lines[np.isclose(lines[:, 0, axis], lines[:, 1, axis]), 0, axis]
-                away = np.abs(xy[:, axis, None] - seams).min(axis=1) / (1e-3 * PIXEL_UM)
-                clear &= (away > 0.5 * WINDOW_PX + ERROR_PX).reshape(z.shape)
+            away = seam_distance(result, photo, places(found.grid, z))
+            clear &= (away > 0.5 * WINDOW_PX + ERROR_PX).reshape(z.shape)
     return clear
+
+
+def seam_distance(result: aerotri.Adjustment, photo: np.ndarray, xyz: np.ndarray) -> np.ndarray:
+    """(n,) px, from where a photograph (n,) shows a place (n, 3) to the nearest seam of its tiles."""
+    images, camera = result.adjusted.images, result.block.cameras[0]
+    rotation = geometry.rotation_from_angles(images.angles, result.block.rotation)
+    u = np.einsum("nji,nj->ni", rotation[photo], xyz - images.centre[photo])
+    xy = -camera.focal_length_mm * u[:, :2] / u[:, 2:]
+    lines, away = np.array(drawing.seams(camera)), np.full(len(xyz), np.inf)
+    for axis in (0, 1):
+        # a seam has the same x, or the same y, at both ends
+        seams = lines[np.isclose(lines[:, 0, axis], lines[:, 1, axis]), 0, axis]
+        away = np.minimum(away, np.abs(xy[:, axis, None] - seams).min(axis=1))
+    return away / (1e-3 * PIXEL_UM)
 
 
 def by_demcor(here: Path, name: str) -> Pair:

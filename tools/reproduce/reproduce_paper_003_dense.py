@@ -9,7 +9,7 @@ the adjustment brings, and what its parameters leave of the image errors: even a
 the difference of what they do to either surface counts. No file has that; the tool looks inside the package for it on
 purpose. Measures: a difference over a σ of all its parts.
 
-    python tools/reproduce/reproduce_paper_003_dense.py [FOLDER] [--noise 50 400] [--keep]
+    python tools/reproduce/reproduce_paper_003_dense.py [FOLDER] [--noise 50 400] [--cameras 11 12 …] [--keep]
 """
 
 from __future__ import annotations
@@ -20,8 +20,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator
-from scipy.spatial import KDTree
 
 import aerotri
 from aerotri.deformation.model_grid import places_of
@@ -30,35 +28,40 @@ from aerotri.public.dense import DenseSurface
 from aerotri.statistics.camera_field import known_field
 from aerotri.terrain.adjustment_part import _by_unknowns as by_unknowns
 from aerotri.terrain.adjustment_part import _covariances as covariances
-from reproduce_paper_003_dem import CM, RESULTS, SETS, SUBSETS, prepare
+from aerotri.terrain.dense.parallaxes import WINDOW_PX
+from reproduce_paper_003_dem import CM, ERROR_PX, RESULTS, SETS, SUBSETS, prepare, seam_distance
 
 HEAD = """# Paper 003, figures 5 to 8, with dense surfaces: even against odd photographs
 
 UltraCamD erring by the physics of its tiles, 0.45 px RMS; 26 photographs at 80 %, models of 60 %. Cells of two pixels
 that both surfaces measured; cm at a GSD of 9 cm. Matching: σ of matching of both; its z: the difference less its mean
-over it. Adjustment: what the adjustment and what its parameters leave bring into the difference; the last z: the
-difference, its mean included, over both together, its root mean square.
+over it. Adjustment: what the adjustment and what its parameters leave bring into the difference; the z after it: the
+difference, its mean included, over both together, its root mean square, in every sixth cell of every sixth row. Clear:
+those of them without a seam of a tile in a window of the matching (7 pixels) in any photograph.
 
 | grain | adjustment | cells | mean, cm | σ, cm | robust σ, cm | matching, cm | σ of z | robust σ of z | beyond 4 σ |\
- adjustment, cm | z | beyond 4 σ |
-|---|---|---|---|---|---|---|---|---|---|---|---|---|"""
-PLACES, EACH, NEAR_M = 4000, 10, 30.0
-"""Places of a surface whose photographs are kept, each how many of them tells the adjustment's part, and m to the place
-of the other surface that stands for it: less than a tenth of a base."""
+ adjustment, cm | z | beyond 4 σ | clear | z | beyond 4 σ |
+|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"""
+OTHERS = """
+Other cameras, grain {grain:g}, in the same cells as the last columns above:
+
+| camera | adjustment | adjustment, cm | z | beyond 4 σ | clear | z | beyond 4 σ |
+|---|---|---|---|---|---|---|---|"""
+STEP = 6
+"""Rows and columns between the cells for which the adjustment's part is computed."""
 WORDS = {"plain": "erring camera, no additional parameters", "perfect": "camera without errors"}
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A surface: height and σ of matching by the place of the cell, m.
+    """A surface: height and σ of matching by the place of the cell, in cells.
 
-    places : (n, 3) m, some of its cells. seen : (n, k) photographs of the block that measured them, −1 beyond.
+    seen : of some cells the photographs of the block that measured them.
     """
 
     z: dict[tuple[int, int], float]
     sigma: dict[tuple[int, int], float]
-    places: np.ndarray
-    seen: np.ndarray
+    seen: dict[tuple[int, int], np.ndarray]
 
 
 def surface(here: Path, result: str, subset: str) -> Measured:
@@ -76,53 +79,62 @@ def surface(here: Path, result: str, subset: str) -> Measured:
         found.save(target, plots=False)
     z, sigma = (aerotri.Surface(target / name) for name in ("dsm.tif", "matching.tif"))
     row, column = np.nonzero(np.isfinite(z.z) & np.isfinite(sigma.z))
-    at = np.column_stack([z.grid.x(column), z.grid.y(row)]) / z.grid.cell_x
-    keys = list(map(tuple, np.floor(at).astype(int).tolist()))
+    keys = keys_of(z.grid, row, column)
     with np.load(here / f"{target.name}.npz") as some:
-        return Measured(
-            dict(zip(keys, z.z[row, column].tolist(), strict=True)),
-            dict(zip(keys, sigma.z[row, column].tolist(), strict=True)),
-            some["places"], some["seen"],
-        )  # fmt: skip
+        seen = dict(zip(map(tuple, some["keys"].tolist()), some["seen"], strict=True))
+    return Measured(
+        dict(zip(keys, z.z[row, column].tolist(), strict=True)),
+        dict(zip(keys, sigma.z[row, column].tolist(), strict=True)), seen,
+    )  # fmt: skip
+
+
+def keys_of(grid, row: np.ndarray, column: np.ndarray) -> list[tuple[int, int]]:
+    """Columns and rows as all surfaces count them: edges of grids are multiples of the cell."""
+    at = np.column_stack([grid.x(column), grid.y(row)]) / grid.cell_x
+    return list(map(tuple, np.floor(at).astype(int).tolist()))
 
 
 def measured_by(found: DenseSurface) -> dict[str, np.ndarray]:
-    """Some cells of a surface and the photographs that measured them, as `Measured` has them."""
+    """Some cells of a surface and the photographs of the block that measured them, −1 beyond."""
     o = found.record
-    places, seen = [], []
+    keys, seen = [], []
     for window, tile in o.files.read_all(list(o.windows)):
         rows, columns = np.nonzero(np.isfinite(tile.z))
-        if not len(rows):
-            continue
-        for n in np.unique(np.linspace(0, len(rows) - 1, max(PLACES // len(o.windows), 4)).astype(int)):
-            x, y = o.grid.x(window.column + columns[n]), o.grid.y(window.row + rows[n])
-            places.append([x, y, tile.z[rows[n], columns[n]]])
-            seen.append(o.photographs.rows[tile.measured_by(rows[n], columns[n])])
+        all_keys = keys_of(o.grid, window.row + rows, window.column + columns)
+        for key, row, column in zip(all_keys, rows, columns, strict=True):
+            if key[0] % STEP == 0 and key[1] % STEP == 0:
+                keys.append(key)
+                seen.append(o.photographs.rows[tile.measured_by(row, column)])
     out = np.full((len(seen), max(map(len, seen))), -1)
-    for own, row in zip(seen, out, strict=True):
-        row[: len(own)] = own
-    return {"places": np.array(places), "seen": out}
+    for own, line in zip(seen, out, strict=True):
+        line[: len(own)] = own
+    return {"keys": np.array(keys), "seen": out}
 
 
-def brought(adjustment: aerotri.Adjustment, even: Measured, odd: Measured) -> LinearNDInterpolator:
-    """m² by X and Y, variance of even − odd by the adjustment and by what its parameters leave of image errors.
+def brought(adjustment: aerotri.Adjustment, xyz: np.ndarray, both: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """(n,) m², variance of even − odd at places (n, 3) m by the adjustment and by the image errors that are left.
 
     [D] Either surface moves by J·dx and by G·e at its rays; even − odd by the difference of both.
+
+    Parameters
+    ----------
+    both : (n, k) photographs that measured the place, even and odd.
     """
     record = adjustment.record
     restitution = replace(restitution_of(record), left=known_field(record))
-    apart, near = KDTree(odd.places[:, :2]).query(even.places[::EACH, :2])
-    own = apart < NEAR_M
-    xyz, rows = even.places[::EACH][own], np.arange(len(record.local.block.images))
-    local = places_of(record).to_local(xyz)
-    both = even.seen[::EACH][own], odd.seen[near[own]]
+    rows, local = np.arange(len(record.local.block.images)), places_of(record).to_local(xyz)
 
     def partials(part: slice) -> np.ndarray:
         one, two = (by_unknowns(record, restitution, rows, local[part], seen[part], plan=False) for seen in both)
         return one - two
 
-    covariance = covariances(record, restitution.left, local, partials, 3)
-    return LinearNDInterpolator(xyz[:, :2], covariance[:, 2, 2])
+    return covariances(record, restitution.left, local, partials, 3)[:, 2, 2]
+
+
+def clear_of_seams(result: aerotri.Adjustment, xyz: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """(n,) whether no seam lies in the windows of a place (n, 3) m in the photographs (n, k) that measured it."""
+    away = np.stack([seam_distance(result, np.maximum(column, 0), xyz) for column in seen.T], axis=1)
+    return (np.where(seen < 0, np.inf, away) > 0.5 * WINDOW_PX + ERROR_PX).all(axis=1)
 
 
 def robust(values: np.ndarray) -> float:
@@ -138,15 +150,43 @@ def line(grain: float, name: str, here: Path, result: str) -> str:
     sigma = CM * np.array([np.hypot(even.sigma[k], odd.sigma[k]) for k in both])
     z = (d - d.mean()) / sigma
     far = 100.0 * np.mean(np.abs(z) > 4.0)
-    cell = aerotri.Surface(here / f"dense {result} even" / "dsm.tif").grid.cell_x
-    shared = CM * np.sqrt(brought(aerotri.open_result(here / result), even, odd)(cell * (np.array(both) + 0.5)))
-    total = (d / np.hypot(sigma, shared))[np.isfinite(shared)]
-    beyond = 100.0 * np.mean(np.abs(total) > 4.0)
+    shared, total, clear = of_all_parts(here, result, even, odd)
     return (
         f"| {grain:g} | {name} | {len(d)} | {d.mean():+.2f} | {d.std():.2f} | {robust(d):.2f} | "
         f"{np.sqrt(np.mean(sigma**2)):.2f} | {z.std():.2f} | {robust(z):.2f} | {far:.2f} % | "
-        f"{np.sqrt(np.nanmean(shared**2)):.2f} | {np.sqrt(np.mean(total**2)):.2f} | {beyond:.2f} % |"
+        f"{in_words(shared, total, clear)} |"
     )
+
+
+def line_of_camera(camera: int, here: Path, result: str, name: str) -> str:
+    """A row of the second table."""
+    even, odd = (surface(here, result, subset) for subset in SUBSETS)
+    return f"| {camera} | {name} | {in_words(*of_all_parts(here, result, even, odd))} |"
+
+
+def in_words(shared: float, total: np.ndarray, clear: np.ndarray) -> str:
+    """What `of_all_parts` gives, as columns."""
+    return f"{shared:.2f} | {told(total)} | {100.0 * clear.mean():.0f} % | {told(total[clear])}"
+
+
+def of_all_parts(here: Path, result: str, even: Measured, odd: Measured) -> tuple[float, np.ndarray, np.ndarray]:
+    """cm, the adjustment's part; even − odd over σ of all parts (n,), and which cells are clear of seams (n,)."""
+    adjustment = aerotri.open_result(here / result)
+    cell = aerotri.Surface(here / f"dense {result} even" / "dsm.tif").grid.cell_x
+    keys = sorted(even.seen.keys() & odd.seen.keys() & even.z.keys() & odd.z.keys())
+    at = cell * (np.array(keys) + 0.5)
+    xyz = np.column_stack([at, [0.5 * (even.z[k] + odd.z[k]) for k in keys]])
+    both = tuple(np.array([one.seen[k] for k in keys]) for one in (even, odd))
+    variance = brought(adjustment, xyz, both)
+    matching = np.array([even.sigma[k] ** 2 + odd.sigma[k] ** 2 for k in keys])
+    d = np.array([even.z[k] - odd.z[k] for k in keys])
+    clear = clear_of_seams(adjustment, xyz, np.hstack(both))
+    return CM * float(np.sqrt(variance.mean())), d / np.sqrt(matching + variance), clear
+
+
+def told(z: np.ndarray) -> str:
+    """Root mean square, and the share beyond 4."""
+    return f"{np.sqrt(np.mean(z**2)):.2f} | {100.0 * np.mean(np.abs(z) > 4.0):.2f} %"
 
 
 def main() -> None:
@@ -154,6 +194,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?", help="to work in; what it holds is not made again")
     parser.add_argument("--noise", type=float, nargs="*", default=(50.0, 400.0), help="σ of the grey values, 16 bit")
+    parser.add_argument("--cameras", type=int, nargs="*", default=tuple(range(11, 19)), help="of the second table")
     parser.add_argument("--keep", action="store_true", help="write tools/results/paper_003_dense.md")
     arguments = parser.parse_args()
     folder, lines = arguments.folder or Path(tempfile.mkdtemp()), [HEAD]
@@ -165,6 +206,14 @@ def main() -> None:
         rows += [(f"erring camera, {name}", erring, name) for name in SETS]
         for name, block, result in rows:
             lines.append(line(grain, name, block, result))
+            print(lines[-1], flush=True)
+    if arguments.cameras:
+        lines.append(OTHERS.format(grain=min(arguments.noise)))
+        print(lines[-1], flush=True)
+    for camera in arguments.cameras:
+        here = prepare(folder / f"camera_{camera}", "erring", min(arguments.noise), camera)
+        for name, result in [(WORDS["plain"], "plain"), *((f"erring camera, {name}", name) for name in SETS)]:
+            lines.append(line_of_camera(camera, here, result, name.removeprefix("erring camera, ")))
             print(lines[-1], flush=True)
     if arguments.keep:
         (RESULTS / "paper_003_dense.md").write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -28,6 +28,7 @@ import numpy as np
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.cluster_fields import (
     NODES,
+    SEEN,
     SIZES,
     FieldEquations,
     correlations,
@@ -43,9 +44,6 @@ from aerotri.statistics.clusters import CAMERA, Clusters
 
 LENGTHS = (0.2, 0.28, 0.4, 0.57, 0.8, 1.13, 1.6)
 """Correlation lengths looked at, in half diagonals of each format, from that of the nodes to that of the format."""
-SEEN = 1e-4
-"""Eigenvalue of K over the largest below which a pattern does not count; chosen [C]: the unknowns take nearly all of it
-up, and what is left shows where the iterations ended."""
 LEAST = 1e-12
 """Of vᵀPv that no field explains: rounding."""
 MOST_CAMERAS = 12

@@ -28,7 +28,7 @@ from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.observations.block import Camera
 from aerotri.results.model_part import ClusterTest, ModelRoot
 from aerotri.statistics import _field_kernels as _kernels
-from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, SAME, Settled
+from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, Settled
 from aerotri.statistics.clusters import Clusters, divided_at_random
 from aerotri.statistics.covariance import InnerDatum
 
@@ -39,6 +39,9 @@ LENGTHS = (0.2, 0.4, 0.8, 1.6, 3.2)
 """Correlation lengths looked at, in half diagonals of each camera's format."""
 SIZES = np.geomspace(1e-2, 1e2, 161)
 """σ_s looked at, in σ of an image coordinate."""
+SEEN = 1e-4
+"""Eigenvalue of K over the largest below which a pattern does not count; chosen [C]: the unknowns take nearly all of it
+up, and what is left shows where the iterations ended."""
 KEPT = 1e-3
 """Share of the largest eigenvalue of R below which a pattern is left out: together a hundredth of the variance."""
 DIVISIONS = 3
@@ -54,7 +57,7 @@ class Field:
     sigma : mm. length : mm, in the largest format. smooth : whether R is exp(−ρ²/2ℓ²).
     gain : twice the logarithm of the likelihood with the field over that without.
     ratio : RMS of the scores along the patterns of the field, over that of white noise.
-    freedom : rank of K.
+    freedom : patterns of K that count.
     root : (c, nodes, k) of σ_s²·R of every camera of the block, the same for cameras of one format.
     """
 
@@ -333,7 +336,7 @@ def fit_field(
     if several:
         normals, scores = _without_common(normals, scores, camera)
     values, vectors = np.linalg.eigh(normals)
-    there = values > SAME * values[-1]
+    there = values > SEEN * values[-1]
     root, freedom = vectors[:, there] * np.sqrt(values[there]), int(there.sum())
     z = (vectors[:, there].T @ scores) / np.sqrt(values[there]) / sigma0
     best, sizes = None, (unit * SIZES) ** 2
