@@ -28,7 +28,7 @@ from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.observations.block import Camera
 from aerotri.results.model_part import ClusterTest, ModelRoot
 from aerotri.statistics import _field_kernels as _kernels
-from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, Settled
+from aerotri.statistics.cluster_test import LEVEL, NUMBERS_AT_ONCE, SAME, Settled
 from aerotri.statistics.clusters import Clusters, divided_at_random
 from aerotri.statistics.covariance import InnerDatum
 
@@ -40,8 +40,8 @@ LENGTHS = (0.2, 0.4, 0.8, 1.6, 3.2)
 SIZES = np.geomspace(1e-2, 1e2, 161)
 """σ_s looked at, in σ of an image coordinate."""
 SEEN = 1e-4
-"""Eigenvalue of K over the largest below which a pattern does not count; chosen [C]: the unknowns take nearly all of it
-up, and what is left shows where the iterations ended."""
+"""Eigenvalue of K over the largest below which the unknowns take up a pattern nearly whole; chosen [C]: what the
+residuals show of it is magnified more than a hundredfold."""
 KEPT = 1e-3
 """Share of the largest eigenvalue of R below which a pattern is left out: together a hundredth of the variance."""
 DIVISIONS = 3
@@ -328,6 +328,10 @@ def fit_field(
 ) -> Field:  # fmt: skip
     """The field with the greatest restricted likelihood.
 
+    Patterns that the unknowns take up nearly whole say little of a field, and much of what the equations do not hold:
+    image errors finer than the nodes, and where the iterations ended. A field that only they call for would be many
+    times too large. Where the other patterns by themselves do not have it rather than noise, these alone count.
+
     Parameters
     ----------
     normals (k, k), scores (k,), camera (m,) : as in `FieldEquations`. several : whether there are several clusters.
@@ -335,28 +339,69 @@ def fit_field(
     """
     if several:
         normals, scores = _without_common(normals, scores, camera)
+    shown, seen = (_patterns(normals, scores, sigma0, share) for share in (SAME, SEEN))
+    sizes = (unit * SIZES) ** 2
+    best = _most_likely(shown, camera, cameras, sizes, sigma0)
+    if _gains(seen, best.correlations[camera], np.array([best.variance]), sigma0)[0][0] < -2.0 * np.log(LEVEL):
+        shown, best = seen, _most_likely(seen, camera, cameras, sizes, sigma0)
+    return Field(
+        float(np.sqrt(best.variance)), largest_half_diagonal(cameras) * best.length, best.smooth, max(best.gain, 0.0),
+        best.ratio, len(shown.scores), roots_of_fields(best.variance * best.correlations),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Patterns:
+    """K^½ (k, q) along its eigenvectors, and the scores along them, whitened by white noise (q,)."""
+
+    root: np.ndarray
+    scores: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """A form, its size mm², its R (c, nodes, nodes), and what it gains."""
+
+    gain: float
+    variance: float
+    length: float
+    smooth: bool
+    ratio: float
+    correlations: np.ndarray
+
+
+def _patterns(normals: np.ndarray, scores: np.ndarray, sigma0: float, share: float) -> _Patterns:
+    """Those whose eigenvalue is above a share of the largest."""
     values, vectors = np.linalg.eigh(normals)
-    there = values > SEEN * values[-1]
-    root, freedom = vectors[:, there] * np.sqrt(values[there]), int(there.sum())
-    z = (vectors[:, there].T @ scores) / np.sqrt(values[there]) / sigma0
-    best, sizes = None, (unit * SIZES) ** 2
+    there = values > share * values[-1]
+    return _Patterns(
+        vectors[:, there] * np.sqrt(values[there]), vectors[:, there].T @ scores / np.sqrt(values[there]) / sigma0
+    )
+
+
+def _most_likely(
+    shown: _Patterns, camera: np.ndarray, cameras: Sequence[Camera], sizes: np.ndarray, sigma0: float
+) -> _Fit:
+    """The form and size with the greatest likelihood."""
+    best = None
     for smooth in (False, True):
         for length in LENGTHS:
             r = correlations(cameras, length, smooth)
-            power, patterns = np.linalg.eigh(spread_of_fields(root, r[camera]) / sigma0**2)
-            power, squares = np.maximum(power, 0.0), (patterns.T @ z) ** 2
-            grown = sizes[:, None] * power
-            gains = np.sum(squares * grown / (1.0 + grown) - np.log1p(grown), axis=1)
+            gains, ratio = _gains(shown, r[camera], sizes, sigma0)
             k = int(np.argmax(gains))
-            if best is None or gains[k] > best[0]:
-                ratio = float(np.sqrt(np.sum(power * squares) / np.sum(power)))
-                best = float(gains[k]), sizes[k], length, smooth, ratio, r
+            if best is None or gains[k] > best.gain:
+                best = _Fit(float(gains[k]), float(sizes[k]), length, smooth, ratio, r)
     assert best is not None
-    gain, variance, length, smooth, ratio, r = best
-    return Field(
-        float(np.sqrt(variance)), largest_half_diagonal(cameras) * length, smooth, max(gain, 0.0), ratio, freedom,
-        roots_of_fields(variance * r),
-    )  # fmt: skip
+    return best
+
+
+def _gains(shown: _Patterns, r: np.ndarray, sizes: np.ndarray, sigma0: float) -> tuple[np.ndarray, float]:
+    """Twice the logarithm of the likelihood over that of white noise by size (mm²); ratio of scores along the field."""
+    power, patterns = np.linalg.eigh(spread_of_fields(shown.root, r) / sigma0**2)
+    power, squares = np.maximum(power, 0.0), (patterns.T @ shown.scores) ** 2
+    grown = sizes[:, None] * power
+    gains = np.sum(squares * grown / (1.0 + grown) - np.log1p(grown), axis=1)
+    return gains, float(np.sqrt(np.sum(power * squares) / np.sum(power)))
 
 
 def _without_common(normals: np.ndarray, scores: np.ndarray, camera: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
