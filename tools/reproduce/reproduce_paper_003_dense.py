@@ -15,7 +15,7 @@ purpose. Measures: a difference over a σ of all its parts.
 from __future__ import annotations
 
 import argparse
-import tempfile
+import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -30,6 +30,10 @@ from aerotri.terrain.adjustment_part import _by_unknowns as by_unknowns
 from aerotri.terrain.adjustment_part import _covariances as covariances
 from aerotri.terrain.dense.parallaxes import WINDOW_PX
 from reproduce_paper_003_dem import CM, ERROR_PX, RESULTS, SETS, SUBSETS, prepare, seam_distance
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "prove"))
+
+from runs_elsewhere import add_executor, folder_of, runs_of
 
 HEAD = """# Paper 003, figures 5 to 8, with dense surfaces: even against odd photographs
 
@@ -158,10 +162,14 @@ def line(grain: float, name: str, here: Path, result: str) -> str:
     )
 
 
-def line_of_camera(camera: int, here: Path, result: str, name: str) -> str:
-    """A row of the second table."""
-    even, odd = (surface(here, result, subset) for subset in SUBSETS)
-    return f"| {camera} | {name} | {in_words(*of_all_parts(here, result, even, odd))} |"
+def lines_of_camera(shared: tuple[Path, float], camera: int) -> list[str]:
+    """Rows of the second table; shared : the folder and the grain."""
+    folder, grain = shared
+    here, lines = prepare(folder / f"camera_{camera}", "erring", grain, camera), []
+    for name, result in [(WORDS["plain"].removeprefix("erring camera, "), "plain"), *((name, name) for name in SETS)]:
+        even, odd = (surface(here, result, subset) for subset in SUBSETS)
+        lines.append(f"| {camera} | {name} | {in_words(*of_all_parts(here, result, even, odd))} |")
+    return lines
 
 
 def in_words(shared: float, total: np.ndarray, clear: np.ndarray) -> str:
@@ -196,8 +204,9 @@ def main() -> None:
     parser.add_argument("--noise", type=float, nargs="*", default=(50.0, 400.0), help="σ of the grey values, 16 bit")
     parser.add_argument("--cameras", type=int, nargs="*", default=tuple(range(11, 19)), help="of the second table")
     parser.add_argument("--keep", action="store_true", help="write tools/results/paper_003_dense.md")
+    add_executor(parser)
     arguments = parser.parse_args()
-    folder, lines = arguments.folder or Path(tempfile.mkdtemp()), [HEAD]
+    folder, lines = folder_of(arguments.folder, arguments), [HEAD]
     print(HEAD)
     for grain in arguments.noise:
         here = folder / f"grain_{grain:g}"
@@ -210,11 +219,10 @@ def main() -> None:
     if arguments.cameras:
         lines.append(OTHERS.format(grain=min(arguments.noise)))
         print(lines[-1], flush=True)
-    for camera in arguments.cameras:
-        here = prepare(folder / f"camera_{camera}", "erring", min(arguments.noise), camera)
-        for name, result in [(WORDS["plain"], "plain"), *((f"erring camera, {name}", name) for name in SETS)]:
-            lines.append(line_of_camera(camera, here, result, name.removeprefix("erring camera, ")))
-            print(lines[-1], flush=True)
+        with runs_of(arguments) as runs:
+            for own in runs(lines_of_camera, (folder, min(arguments.noise)), arguments.cameras):
+                lines += own
+                print("\n".join(own))
     if arguments.keep:
         (RESULTS / "paper_003_dense.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
