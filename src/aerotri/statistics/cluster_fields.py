@@ -28,7 +28,7 @@ from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.observations.block import Camera
 from aerotri.results.model_part import ClusterTest, ModelRoot
 from aerotri.statistics import _field_kernels as _kernels
-from aerotri.statistics.cluster_test import LEVEL, NUMBERS_AT_ONCE, SAME, Settled
+from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, SAME, Settled
 from aerotri.statistics.clusters import Clusters, divided_at_random
 from aerotri.statistics.covariance import InnerDatum
 
@@ -42,6 +42,9 @@ SIZES = np.geomspace(1e-2, 1e2, 161)
 SEEN = 1e-4
 """Eigenvalue of K over the largest below which the unknowns take up a pattern nearly whole; chosen [C]: what the
 residuals show of it is magnified more than a hundredfold."""
+AGREEING = 0.9
+"""Share of the gain that the patterns seen well have with a field of their own, down to which they agree with another;
+chosen [C]: 0.98 and more on real flights, −3 to 0.86 where single patterns called for errors of millimetres."""
 KEPT = 1e-3
 """Share of the largest eigenvalue of R below which a pattern is left out: together a hundredth of the variance."""
 DIVISIONS = 3
@@ -330,7 +333,7 @@ def fit_field(
 
     Patterns that the unknowns take up nearly whole say little of a field, and much of what the equations do not hold:
     image errors finer than the nodes, and where the iterations ended. A field that only they call for would be many
-    times too large. Where the other patterns by themselves do not have it rather than noise, these alone count.
+    times too large. Where it explains the other patterns much worse than what fits these best, they alone count.
 
     Parameters
     ----------
@@ -341,9 +344,10 @@ def fit_field(
         normals, scores = _without_common(normals, scores, camera)
     shown, seen = (_patterns(normals, scores, sigma0, share) for share in (SAME, SEEN))
     sizes = (unit * SIZES) ** 2
-    best = _most_likely(shown, camera, cameras, sizes, sigma0)
-    if _gains(seen, best.correlations[camera], np.array([best.variance]), sigma0)[0][0] < -2.0 * np.log(LEVEL):
-        shown, best = seen, _most_likely(seen, camera, cameras, sizes, sigma0)
+    best, of_seen = (_most_likely(patterns, camera, cameras, sizes, sigma0) for patterns in (shown, seen))
+    under = _gains(seen, best.correlations[camera], np.array([best.variance]), sigma0)[0][0]
+    if under < AGREEING * of_seen.gain:
+        shown, best = seen, of_seen
     return Field(
         float(np.sqrt(best.variance)), largest_half_diagonal(cameras) * best.length, best.smooth, max(best.gain, 0.0),
         best.ratio, len(shown.scores), roots_of_fields(best.variance * best.correlations),
