@@ -44,7 +44,7 @@ SEEN = 1e-4
 residuals show of it is magnified more than a hundredfold."""
 AGREEING = 0.9
 """Share of the gain that the patterns seen well have with a field of their own, down to which they agree with another;
-chosen [C]: 0.98 and more on real flights, −3 to 0.86 where single patterns called for errors of millimetres."""
+chosen [C]: 0.98 and more on a real flight, −3 to 0.86 where single patterns called for errors of millimetres."""
 KEPT = 1e-3
 """Share of the largest eigenvalue of R below which a pattern is left out: together a hundredth of the variance."""
 DIVISIONS = 3
@@ -342,7 +342,8 @@ def fit_field(
     """
     if several:
         normals, scores = _without_common(normals, scores, camera)
-    shown, seen = (_patterns(normals, scores, sigma0, share) for share in (SAME, SEEN))
+    values, vectors = np.linalg.eigh(normals)
+    shown, seen = (_patterns(values, vectors, scores / sigma0, share) for share in (SAME, SEEN))
     sizes = (unit * SIZES) ** 2
     best, of_seen = (_most_likely(patterns, camera, cameras, sizes, sigma0) for patterns in (shown, seen))
     under = _gains(seen, best.correlations[camera], np.array([best.variance]), sigma0)[0][0]
@@ -374,13 +375,11 @@ class _Fit:
     correlations: np.ndarray
 
 
-def _patterns(normals: np.ndarray, scores: np.ndarray, sigma0: float, share: float) -> _Patterns:
-    """Those whose eigenvalue is above a share of the largest."""
-    values, vectors = np.linalg.eigh(normals)
+def _patterns(values: np.ndarray, vectors: np.ndarray, scores: np.ndarray, share: float) -> _Patterns:
+    """Those whose eigenvalue of K is above a share of the largest; scores over σ0."""
     there = values > share * values[-1]
-    return _Patterns(
-        vectors[:, there] * np.sqrt(values[there]), vectors[:, there].T @ scores / np.sqrt(values[there]) / sigma0
-    )
+    size = np.sqrt(values[there])
+    return _Patterns(vectors[:, there] * size, vectors[:, there].T @ scores / size)
 
 
 def _most_likely(
