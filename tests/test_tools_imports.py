@@ -32,6 +32,7 @@ INSIDE = {
     "prove/dense_surface.py": "σ of matching alone, cell by cell, and semi-global matching alone on the same pairs",
     "prove/fuzzing/hostile.py": "damaged files for single readers, and for the commands",
     "prove/fuzzing/readers.py": "damaged files for single readers",
+    "prove/league_programs/colmap.py": "gives pycolmap the observations and the datum of an adjustment in its frame",
     "prove/kill.py": "kills the commands from within",
     "prove/deviations.py": "the sizes of image errors that it simulates, parameter by parameter",
     "prove/model_part.py": "every part of the covariance alone, of clusters of photographs",

@@ -1,0 +1,1 @@
+"""What single programs state as σ of a block."""
