@@ -28,7 +28,7 @@ import numpy as np
 
 import aerotri
 import real_data
-from real_data import Ran, command
+from real_data import Ran, command, into_page, version
 
 LIMIT_S = 1500
 """Of a block with all its points left out, seconds."""
@@ -142,16 +142,6 @@ CASES: dict[str, Steps] = {
     "dmc_ngi": dmc,
     **RUNS,
 }
-
-
-def version() -> str:
-    """Commit of the program and its date."""
-    root = Path(__file__).parents[2]
-    told = subprocess.run(
-        ["git", "log", "-1", "--format=%h %cd", "--date=format:%Y-%m-%d %H:%M"], cwd=root, capture_output=True,
-        text=True, check=False,
-    )  # fmt: skip
-    return told.stdout.strip() or aerotri.__version__
 
 
 def computed(name: str, data: Path, work: Path) -> Row:
@@ -270,6 +260,26 @@ def table(rows: Sequence[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
+SHORT = (
+    "block", "exit", "verdict", "parameters", "σ0", "points", "RMS dX dY m", "over total and given σ", "RMS dZ m",
+    "over total and given σ", "s", "version",
+)  # fmt: skip
+
+
+def short_table(rows: Sequence[Row]) -> list[str]:
+    """The essence of the table, for the page."""
+    lines = ["| " + " | ".join(SHORT) + " |", "|" + "---|" * len(SHORT)]
+    for row in rows:
+        plan, height = ([number(v) for v in three] if three else ["", "", ""] for three in (row.plan, row.height))
+        cells = [
+            row.block.replace("_", " "), number(row.code, "d"), row.verdict, number(row.count, "d"),
+            number(row.sigma0), row.held, plan[0], plan[2], height[0], height[2], number(row.seconds, ".0f"),
+            row.version.split(" ")[0],
+        ]  # fmt: skip
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
 def rows_there(work: Path) -> list[Row]:
     files = {path.stem: path for path in (work / "rows").glob("*.json")}
     return [Row(**json.loads(files[name].read_text(encoding="utf-8"))) for name in CASES if name in files]
@@ -293,9 +303,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path, help="folder with the data sets")
     parser.add_argument("--work", type=Path, required=True, help="folder for blocks, results and rows; kept")
-    parser.add_argument("--blocks", nargs="+", choices=list(CASES), default=list(CASES))
+    parser.add_argument("--blocks", nargs="*", choices=list(CASES), default=list(CASES))
     parser.add_argument("--limit", type=int, default=LIMIT_S, help="seconds for a block")
     parser.add_argument("--table", type=Path, help="file for the table, written anew after every block")
+    parser.add_argument("--page", type=Path, help="page of the documentation that gets the essence")
     parser.add_argument("--one", choices=list(CASES), help=argparse.SUPPRESS)
     options = parser.parse_args()
     (options.work / "rows").mkdir(parents=True, exist_ok=True)
@@ -308,6 +319,8 @@ def main() -> None:
         in_own_process(name, options)
         if options.table:
             options.table.write_text(table(rows_there(options.work)), encoding="utf-8")
+    if options.page:
+        into_page(options.page, "real blocks", short_table(rows_there(options.work)))
     if not options.table:
         print(table(rows_there(options.work)))
 

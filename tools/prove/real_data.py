@@ -55,6 +55,26 @@ class Ran:
     seconds: float
 
 
+def into_page(page: Path, name: str, lines: Sequence[str]) -> None:
+    """Put lines of a result between the marks of that name in a page of the documentation."""
+    text = page.read_text(encoding="utf-8")
+    begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+    if begin not in text or end not in text:
+        raise SystemExit(f"{page} has no marks '{name}'")
+    before, rest = text.split(begin, 1)
+    after = rest.split(end, 1)[1]
+    page.write_text(before + begin + "\n".join(["", *lines, ""]) + end + after, encoding="utf-8")
+
+
+def version() -> str:
+    """Commit of the program and its date."""
+    told = subprocess.run(
+        ["git", "log", "-1", "--format=%h %cd", "--date=format:%Y-%m-%d %H:%M"], cwd=Path(__file__).parent,
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    return told.stdout.strip() or aerotri.__version__
+
+
 def command(*words: object) -> Ran:
     """Run a command of aerotri in a process of its own."""
     texts = tuple(str(word) for word in words)

@@ -190,7 +190,8 @@ def _tie_cameras(problem: Problem) -> None:
             if group == ours.name and name.startswith("lens.")
         }
         if camera.model.name in ("FULL_OPENCV", "OPENCV"):
-            rows.append((np.eye(size)[0] - np.eye(size)[1], 0.0, HELD_PX))
+            if "b1" not in own:
+                rows.append((np.eye(size)[0] - np.eye(size)[1], 0.0, HELD_PX))
             rows += [(np.eye(size)[place], camera.params[place], HELD_LENS) for name, place in LENS_NAMES.items()
                      if place < size and name not in own]  # fmt: skip
         if rows:
@@ -307,7 +308,7 @@ def _interior(problem: Problem, found: Any, scale: float) -> dict[str, np.ndarra
         cofactor, ours = found.get_other_params_cov(camera.params), problem.ours.block.cameras[number - 1]
         if cofactor is not None:
             two = camera.model.name in ("FULL_OPENCV", "OPENCV")
-            variance = np.diagonal(cofactor)[[0, 2, 3] if two else [0, 1, 2]]
+            variance = np.diagonal(cofactor)[[1, 2, 3] if two else [0, 1, 2]]
             out[ours.name] = scale * ours.pixel_mm * np.sqrt(variance)
     return out
 

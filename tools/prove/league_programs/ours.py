@@ -33,6 +33,14 @@ def stated(program: str, found: aerotri.Adjustment, total: bool) -> Stated:
     )
 
 
+def adjusted(block: aerotri.Block, parameters: str, robust: str) -> aerotri.Adjustment | str:
+    try:
+        found = aerotri.adjust(block, parameters=parameters, robust=robust, max_iterations=150, explain=False)  # pyright: ignore[reportArgumentType]
+    except (aerotri.AdjustmentFailedError, aerotri.InputError) as failure:
+        return str(failure)
+    return found if found.status == "converged" else found.adjusted.outcome.message
+
+
 def _named(names: np.ndarray, sigma: np.ndarray) -> dict[str, np.ndarray]:
     return {str(name): row for name, row in zip(names, sigma, strict=True) if np.isfinite(row).all()}
 
