@@ -161,7 +161,7 @@ def found_of(name: str, data: Path, work: Path) -> Found:
         except RuntimeError as failure:
             notes.append(f"pycolmap: {failure}")
     else:
-        notes.append("pycolmap's covariance knows no photographs on a rig.")
+        notes.append("pycolmap is not run on blocks with a rig.")
     return Found(tuple(columns), tuple(notes))
 
 
