@@ -210,6 +210,16 @@ def result(work: Path) -> str:
 NAMES = (*ENTRIES, *SIMULATED, "correlations")
 
 
+def write(options: argparse.Namespace) -> None:
+    """The results and the page as far as they are there; without a file for them, to the screen."""
+    if options.table:
+        options.table.write_text(result(options.work), encoding="utf-8")
+    else:
+        print(result(options.work))
+    for name, read in sections_there(options.work).items() if options.page else ():
+        into_page(options.page, name, [*read["short"], "", f"Version {read['version']}."])
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path, help="folder with the data sets")
@@ -229,12 +239,9 @@ def main() -> None:
         return
     for name in options.blocks:
         in_own_process(name, options)
-        if options.table:
-            options.table.write_text(result(options.work), encoding="utf-8")
-    for name, read in sections_there(options.work).items() if options.page else ():
-        into_page(options.page, name, [*read["short"], "", f"Version {read['version']}."])
-    if not options.table:
-        print(result(options.work))
+        write(options)
+    if not options.blocks:
+        write(options)
 
 
 if __name__ == "__main__":

@@ -299,6 +299,17 @@ def in_own_process(name: str, options: argparse.Namespace) -> None:
         place.write_text(json.dumps(asdict(row)), encoding="utf-8")
 
 
+def write(options: argparse.Namespace) -> None:
+    """The table and the page as far as they are there; without a file for the table, to the screen."""
+    rows = rows_there(options.work)
+    if options.table:
+        options.table.write_text(table(rows), encoding="utf-8")
+    else:
+        print(table(rows))
+    if options.page:
+        into_page(options.page, "real blocks", short_table(rows))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path, help="folder with the data sets")
@@ -317,12 +328,9 @@ def main() -> None:
         return
     for name in options.blocks:
         in_own_process(name, options)
-        if options.table:
-            options.table.write_text(table(rows_there(options.work)), encoding="utf-8")
-    if options.page:
-        into_page(options.page, "real blocks", short_table(rows_there(options.work)))
-    if not options.table:
-        print(table(rows_there(options.work)))
+        write(options)
+    if not options.blocks:
+        write(options)
 
 
 if __name__ == "__main__":
