@@ -141,6 +141,17 @@ def test_fewer_than_thirty_are_said():
         assert "call for a minimum of thirty (30) checkpoints" in text
         assert "performed using ONLY 12 checkpoints" in text
         assert "tested to meet" not in text
+        assert "produced to meet a 5(cm)" in text
+
+
+@pytest.mark.parametrize("asked", [{}, {"horizontal": 0.001, "vertical": 0.001}], ids=["nothing", "more than found"])
+def test_nothing_was_produced_to_meet_a_class_that_nobody_asked_for(asked):
+    """Of few check points: what was found stands there, and no class that the program chose."""
+    r = record(points(noise(12), KEPT["survey"]), **asked)
+    assert len(r.statements) == 2
+    for text, rmse in zip(r.statements, (r.rmse_h, r.nva), strict=True):
+        assert "produced to meet" not in text
+        assert f"= {100 * rmse:.2f}(cm) using the reduced number of checkpoints." in text
 
 
 def test_without_check_points():

@@ -36,7 +36,7 @@ def test_a_block_is_adjusted(flight, tmp_path):
     checked = json.loads((tmp_path / "out" / "accuracy" / "accuracy.json").read_text())
     assert checked["check_points"] == len(project.accuracy.record.points) > 0
     page = project.report.read_text(encoding="utf-8")
-    assert f"RMSE_H {100.0 * checked['accuracy']['RMSE_H']:.1f} cm in plan" in page
+    assert f"RMSE_H {100.0 * checked['accuracy']['RMSE_H']:.2f} cm in plan" in page
     assert "that is required is met" in page
     assert "Accuracy by check points" in page
     assert (project.verdict, project.complete) == ("accepted", True)

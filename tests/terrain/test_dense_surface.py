@@ -132,7 +132,7 @@ def test_medians_keep_few_cells_in_memory(monkeypatch):
     nodes[:, :, 2] = 0.05**2
     o = SimpleNamespace(
         files=SimpleNamespace(read_all=tiles), windows=[TileWindow(0, side * n, side, side) for n in range(count)],
-        grid=grid, shared=SharedPart(np.array([0.0, 1e6]), np.array([0.0, -1e6]), nodes),
+        grid=grid, shared=SharedPart(np.array([0.0, 1e6]), np.array([0.0, -1e6]), nodes, nodes[:, :, 2]),
         photographs=SimpleNamespace(gsd=np.array([0.5])), cells=side * side * count, shared_cells=2.0,
         across_px=np.zeros(1), pairs=np.array([[0, 1]]), resumed=0, pixel=3.0, level=0,
     )  # fmt: skip

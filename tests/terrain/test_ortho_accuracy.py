@@ -77,7 +77,7 @@ def test_details_lie_as_the_joint_covariance_says(slope):
                     place[None], np.array([image]), along[:, :2] / along[:, 2:], slope[None], images[None]
                 )
                 given = calibration, restitution, rows, place[None], np.array([image])
-                variance = shown_variances(cells, shown_covariances(*given, images[None]))[0]
+                variance = shown_variances(cells, shown_covariances(*given, images[None])[0])[0]
                 normalised.append((shown - place)[:2] / np.sqrt(variance))
                 of_height = covariances_at(*given[:4], images[None])[0, 2, 2] * cells.along[0] ** 2
                 apart.append(np.sqrt((np.diagonal(plan_covariances(*given)[0]) + of_height) / variance))
@@ -101,7 +101,7 @@ def test_a_shift_of_the_block_moves_details_as_it_does_the_surface():
     images, rows = seen_by(made, place)[None], np.arange(len(block.images))
     along = (place - made.centre[1])[None]
     cells = ShownCells(place[None], np.array([1]), along[:, :2] / along[:, 2:], SLOPE[None], images)
-    both = shown_covariances(calibration, restitution, rows, place[None], np.array([1]), images)
+    both = shown_covariances(calibration, restitution, rows, place[None], np.array([1]), images)[0]
     np.testing.assert_allclose(shown_variances(cells, both)[0], np.diagonal(both[0, 3:5, 3:5]), rtol=0.1)
     # and not as the height of the surface and the ray apart would make it
     alone = plan_covariances(calibration, restitution, rows, place[None], np.array([1]))[0]

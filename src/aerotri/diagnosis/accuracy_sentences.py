@@ -21,8 +21,9 @@ FOUND = {
 def statements(r: AccuracyRecord) -> tuple[str, ...]:
     """Of plan, height, height in vegetation: those that the check points allow; none of a rejected result.
 
-    A class that was asked for stands there where the RMSE and the surveys of check and control points allow it,
-    otherwise the smallest class that they allow. Without stated survey errors the RMSE are not known: no sentence.
+    A class that was asked for stands there where the RMSE and the surveys of check and control points allow it. Thirty
+    check points or more show the smallest class that they allow otherwise; fewer only show what was found: nothing was
+    "produced to meet" a class that nobody asked for. Without stated survey errors the RMSE are not known: no sentence.
     Without check points a class is there where the survey of control allows it.
     """
     if r.verdict == "rejected":
@@ -45,14 +46,15 @@ def _statement(of: str, what: str, asked: float | None, least: float, count: int
     allowed = asked is not None and least <= asked * (1.0 + ROUNDING)
     if count == 0:
         return _produced(of, asked) if asked is not None and allowed else ""
-    name = class_text(asked if asked is not None and allowed else reached(least))
     value = FOUND[of].format(f"{100.0 * rmse:.2f}")
     if count >= ENOUGH:
+        name = class_text(asked if asked is not None and allowed else reached(least))
         return f"This data set was tested to meet {STANDARD} for a {name}(cm) {what}. {value}."
+    meant = f"This data set was produced to meet a {class_text(asked)}(cm) {what}. " if asked and allowed else ""
     return (
         f"This data set was tested as required by {STANDARD}. Although the Standards call for a minimum of thirty (30) "
-        f"checkpoints, this test was performed using ONLY {count} checkpoints. This data set was produced to meet a "
-        f"{name}(cm) {what}. {value} using the reduced number of checkpoints."
+        f"checkpoints, this test was performed using ONLY {count} checkpoints. {meant}{value} using the reduced number "
+        "of checkpoints."
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from aerotri.diagnosis.finding import SIGNIFICANCE, Finding, Grade, chi_square_p, graded, metre_digits, times
 from aerotri.diagnosis.geometry import usual_distance
 from aerotri.quantiles import chi_square_quantile
+from aerotri.results.accuracy import in_plan, with_survey
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 
 ENOUGH_CHECK_POINTS = 30
@@ -30,6 +31,7 @@ class GroundStatistics:
     ----------
     count, rms, mean, max : (3,) of X, Y, Z; max without sign.
     expected : (3,) the RMS that the σ of the adjusted and the given coordinates lead to expect.
+    survey : (3,) RMS of the σ of the given coordinates, 0 where none is stated.
     """
 
     count: np.ndarray
@@ -37,16 +39,27 @@ class GroundStatistics:
     mean: np.ndarray
     max: np.ndarray
     expected: np.ndarray
+    survey: np.ndarray
+
+    @property
+    def fit_h(self) -> float:
+        """m, √(RMS_X² + RMS_Y²): of the differences alone."""
+        return in_plan(self.rms[0], self.rms[1])
+
+    @property
+    def expected_h(self) -> float:
+        """m, what the σ lead to expect of it."""
+        return in_plan(self.expected[0], self.expected[1])
 
     @property
     def rmse_h(self) -> float:
-        """m, √(RMS_X² + RMS_Y²)."""
-        return float(np.hypot(self.rms[0], self.rms[1]))
+        """m, RMSE_H as ASPRS has it: with the survey error of the points."""
+        return in_plan(*(with_survey(self.rms[k], self.survey[k]) for k in (0, 1)))
 
     @property
     def rmse_v(self) -> float:
-        """m."""
-        return float(self.rms[2])
+        """m, RMSE_V likewise."""
+        return with_survey(self.rms[2], self.survey[2])
 
 
 def ground_statistics(adjusted: AdjustedBlock, results: GroundPointResults) -> GroundStatistics:
@@ -67,7 +80,8 @@ def ground_statistics(adjusted: AdjustedBlock, results: GroundPointResults) -> G
         mean = filled.sum(axis=0) / n
         largest = np.where(n > 0, np.abs(filled).max(axis=0, initial=0.0), np.nan)
         expected = np.sqrt(np.where(given, variance, 0.0).sum(axis=0) / n)
-    return GroundStatistics(n, rms, mean, largest, expected)
+        survey = np.sqrt(np.where(given, sigma**2, 0.0).sum(axis=0) / n)
+    return GroundStatistics(n, rms, mean, largest, expected, survey)
 
 
 def sigma_given(adjusted: AdjustedBlock, results: GroundPointResults) -> np.ndarray:
@@ -110,9 +124,9 @@ def of_check_points(adjusted: AdjustedBlock) -> list[Finding]:
                 "too few to report a tested accuracy" if few else "enough", "attention" if few else "good"),
     ]  # fmt: skip
     distance = usual_distance(adjusted)
-    for name, rmse, axes in (("RMSE_H", s.rmse_h, [0, 1]), ("RMSE_V", s.rmse_v, [2])):
+    for name, fit, axes in (("fit in plan", s.fit_h, [0, 1]), ("fit in height", float(s.rms[2]), [2])):
         expected, n = float(np.hypot.reduce(s.expected[axes])), _freedom(s, results, axes)
-        found.append(_rmse(f"{name} {AT_CHECK_POINTS}", rmse, expected, n, digits, distance))
+        found.append(_fit(f"{name} {AT_CHECK_POINTS}", fit, expected, n, digits, distance))
     return found
 
 
@@ -134,23 +148,23 @@ def in_doubt(adjusted: AdjustedBlock) -> bool:
     return bool(doubtful) and adjusted.check.freedom is None
 
 
-def _rmse(name: str, rmse: float, expected: float, n: float, digits: int, distance: float) -> Finding:
+def _fit(name: str, rms: float, expected: float, n: float, digits: int, distance: float) -> Finding:
     """RMS against the σ of adjusted and given coordinates; n independent differences make the χ² bound."""
-    if n == 0 or not np.isfinite(rmse):
+    if n == 0 or not np.isfinite(rms):
         return Finding(name, "–", "–", "no coordinate to compare", "note")
-    if rmse > ABSURD * distance:
-        reason = f"{name} is {rmse:.3g} m, at a distance of {distance:.3g} m from the cameras"
-        return Finding(name, f"{rmse:.3g} m", f"{expected:.3g} m from the σ", "no result", "attention", "rejected",
+    if rms > ABSURD * distance:
+        reason = f"{name} is {rms:.3g} m, at a distance of {distance:.3g} m from the cameras"
+        return Finding(name, f"{rms:.3g} m", f"{expected:.3g} m from the σ", "no result", "attention", "rejected",
                        reason)  # fmt: skip
     limit = expected * float(np.sqrt(chi_square_quantile(0.975, n) / n))
-    value = f"{rmse:.{digits}f} m"
+    value = f"{rms:.{digits}f} m"
     text = f"{expected:.{digits}f} m from the σ; at most {limit:.{digits}f} m (χ², 97.5 %)"
-    if not rmse > limit:
+    if not rms > limit:
         return Finding(name, value, text, "as the σ say", "good")
     grade: Grade = "accepted"
-    if chi_square_p(n * (rmse / expected) ** 2, n) < SIGNIFICANCE:
-        grade = graded(rmse / expected, POOR, WORTHLESS)
-    reason = f"{name} is {value}, {times(rmse / expected)} as large as expected from the σ"
+    if chi_square_p(n * (rms / expected) ** 2, n) < SIGNIFICANCE:
+        grade = graded(rms / expected, POOR, WORTHLESS)
+    reason = f"{name} is {value}, {times(rms / expected)} as large as expected from the σ"
     return Finding(name, value, text, "larger than the σ say: systematic errors, or σ too small", "attention", grade,
                    reason if grade != "accepted" else "")  # fmt: skip
 

@@ -17,6 +17,7 @@ from aerotri.pipeline.components import with_variance_components
 from aerotri.pipeline.in_frame import adjust_in_frame
 from aerotri.pipeline.local import Report
 from aerotri.pipeline.model_part import with_model_part
+from aerotri.pipeline.relative import with_relative
 from aerotri.pipeline.shutter_test import with_shutter_test
 from aerotri.pipeline.starting import with_start
 from aerotri.pipeline.verdict import causes, judged, with_outcome
@@ -79,7 +80,7 @@ def adjust_keeping_system(
         found = adjust_in_frame(block, report, given_points, geoid)
     if block.settings.adjustment.variance_components == "on":
         found = with_variance_components(block, found, report, geoid)
-    found = judged(with_model_part(found))
+    found = judged(with_relative(with_model_part(found)))
     if tested and asks_for_test(block):
         found = with_shutter_test(found, report)
     return started.told(found if choice is None else with_reason(found, choice))

@@ -9,6 +9,7 @@ from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates.blocks import frame_of_block
 from aerotri.diagnosis import diagnose, judge
 from aerotri.diagnosis.check_points import in_doubt
+from aerotri.diagnosis.purpose import purpose
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock, Outcome
 from aerotri.results.adjustment import Adjustment
@@ -24,7 +25,13 @@ def judged(found: Adjustment) -> Adjustment:
         found = replace(found, local=local, result=local if found.frame is None else found.result)
     verdict = judge(found.local)
     outcome = replace(found.result.outcome, verdict=verdict.level, reasons=verdict.reasons)
-    return with_outcome(found, outcome)
+    return with_purpose(with_outcome(found, outcome))
+
+
+def with_purpose(found: Adjustment) -> Adjustment:
+    """The judged adjustment with what it is good for."""
+    good = purpose(found.local)
+    return with_outcome(found, replace(found.result.outcome, good_for=good.good_for, purpose=good.says))
 
 
 def with_outcome(found: Adjustment, outcome: Outcome) -> Adjustment:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import FilePath
 from aerotri.public.folders import paths_of
@@ -76,6 +76,23 @@ class Adjustment:
     def reasons(self) -> tuple[str, ...]:
         """Why the result is not simply accepted, in sentences."""
         return self.adjusted.outcome.reasons
+
+    @property
+    def good_for(self) -> str:
+        """'absolute' (positions in the coordinate system, and the shape), 'relative' (the shape alone) or 'neither'."""
+        return self.adjusted.outcome.good_for
+
+    @property
+    def purpose(self) -> str:
+        """The same in a sentence or two, with the numbers; '' where it is not known."""
+        return self.adjusted.outcome.purpose
+
+    @property
+    def precision(self) -> dict[str, Any]:
+        """Absolute and relative σ side by side, m: medians, the whole block, neighbours; that of adjustment.json."""
+        from aerotri.formats.results.adjustment import both_precisions
+
+        return both_precisions(self.adjusted)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -331,5 +348,6 @@ class Adjustment:
         return (
             f"<div><b>{escape(str(self.block.name))}: {escape(o.verdict)}</b> ({escape(o.status)}), "
             f"σ<sub>0</sub> {o.sigma0:.4g} ({o.sigma0_um:.3g} µm), redundancy {o.redundancy}"
+            f"{f'<p>{escape(o.purpose)}</p>' if o.purpose else ''}"
             f"{f'<ul>{reasons}</ul>' if reasons else ''}{self.groups.html()}</div>"
         )

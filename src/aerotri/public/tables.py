@@ -22,7 +22,7 @@ from aerotri.formats.results.reliability_columns import control_columns
 from aerotri.public.table import Table
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 
-METRES = tuple(f"{letter}{axis}{of}" for letter in ("", "s", "m", "t") for axis in "XYZ" for of in ("", "0"))
+METRES = tuple(f"{letter}{axis}{of}" for letter in ("", "s", "m", "t", "x_r") for axis in "XYZ" for of in ("", "0"))
 DIFFERENCES = ("dX", "dY", "dZ")
 DEGREES = tuple(f"{letter}{angle}" for letter in ("", "s_", "m_", "t_") for angle in ("omega", "phi", "kappa"))
 UNITS = {

@@ -214,6 +214,7 @@ def _stated(adjustment: Adjustment | FilePath | None) -> StatedAdjustment | None
 
 
 def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport) -> MeasuredVolume:
+    from aerotri.formats.results.adjusted import adjusted_json
     from aerotri.formats.results.volume import Sources, pile_json, volume_json
     from aerotri.rasters.grids import cache_limited
     from aerotri.rasters.metric import refuse_stretched
@@ -263,6 +264,8 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
         pile_json(one, own, asked.density, own_stated)
         for one, own, own_stated in zip(piles, sigmas, each_stated, strict=True)
     ]
+    content["adjusted"] = None if top.adjustment is None else adjusted_json(top.adjustment.record.result)
+    content["base"]["follows_surface"] = _follows(asked.base)
     content["settings"] = asked.settings
     outlines = outline_notes(boundary, min(reader.grid.cell_x, reader.grid.cell_y)) if _follows(asked.base) else ()
     silent = "" if any(other.crs_code for other in others) else _without_crs(top, reader)

@@ -24,7 +24,7 @@ ACCURACY = (
     Item("reached.horizontal", "number?", "In plan; null without check points.", "m"),
     Item("reached.vertical", "number?", "In height outside vegetation; null without check points.", "m"),
     Item("accuracy", "object", "Root mean square errors with the survey error of the check points."),
-    Item("accuracy.RMSE_H", "number?", "In plan: √(RMSE_X² + RMSE_Y²).", "m"),
+    Item("accuracy.RMSE_H", "number?", "In plan: √(RMSE_X² + RMSE_Y²), survey error included.", "m"),
     Item("accuracy.RMSE_V", "number?", "In height outside vegetation (NVA).", "m"),
     Item("accuracy.VVA", "number?", "In height within vegetation; null where no check point stands there.", "m"),
     Item("accuracy.RMSE_3D", "number?", "In plan and height: √(RMSE_H² + RMSE_V²).", "m"),

@@ -12,7 +12,7 @@ from aerotri.reference.adjust_models import (
 )
 from aerotri.reference.adjust_tables import PARAMETERS, PLACE, RIGS, WHERE_MODEL, with_totals
 from aerotri.reference.compared_contents import COMPARE_PARAMETERS
-from aerotri.reference.head import BLOCK, HEAD, ORIGINS
+from aerotri.reference.head import BLOCK, GOOD_FOR, HEAD, ORIGINS
 from aerotri.reference.records import DescribedFile, Item, axes_object, of_axes, within
 
 STATUS_WORDS = {
@@ -38,6 +38,31 @@ def _ground_points(name: str, what: str) -> tuple[Item, ...]:
     )
 
 
+def _precision() -> tuple[Item, ...]:
+    """Absolute and relative σ side by side."""
+    said = "Median total standard deviation of the {} as the block stands (null where nothing holds it)"
+    left = "The same relative to the whole block, after a similarity (shift, rotation, scale) of all points"
+    found = [Item("precision", "object", "Absolute and relative standard deviations side by side.")]
+    for name, what in (("points", "object points"), ("centres", "projection centres")):
+        found.append(Item(f"precision.{name}", "object", f"Of the {what}."))
+        found += axes_object(f"precision.{name}.absolute_m", said.format(what))
+        found += axes_object(f"precision.{name}.relative_m", left)
+    near = "precision.neighbours"
+    return (
+        *found,
+        *axes_object("precision.position_m", "Standard deviation of the place of the whole block, at its middle"),
+        Item("precision.rotation_deg", "object", "Standard deviation of the rotation of the whole block.", "deg"),
+        *of_axes("precision.rotation_deg.{}", "number?", "About the axis {}.", "deg"),
+        Item("precision.scale", "number?", "Standard deviation of the scale of the whole block: 0.01 is 1 %."),
+        Item(near, "object?", "Height differences of object points half a base apart, median of some pairs."),
+        Item(f"{near}.distance_m", "number", "How far apart they are in plan.", "m"),
+        Item(f"{near}.pairs", "whole", "Number of pairs."),
+        Item(f"{near}.sigma_dZ_m", "number?", "Total standard deviation of the difference, tilts of the block "
+             "included.", "m"),
+        Item(f"{near}.relative_sigma_dZ_m", "number?", "The same after a similarity of the whole block.", "m"),
+    )  # fmt: skip
+
+
 ADJUSTMENT = (
     *HEAD,
     BLOCK,
@@ -54,6 +79,8 @@ ADJUSTMENT = (
         },
     ),
     Item("reasons[]", "text", "Why the result is doubtful or rejected, the gravest reason first."),
+    Item("good_for", "text", "What the result is good for.", values=GOOD_FOR),
+    Item("purpose", "text", "The same in a sentence or two, with the numbers; empty where it is not known."),
     Item("message", "text", "What is wrong, where the adjustment did not converge; else empty."),
     Item("iterations", "whole", "Number of iterations."),
     Item("sigma0", "number?", "Standard deviation of unit weight, σ0; 1 where all stated σ are right."),
@@ -161,6 +188,7 @@ ADJUSTMENT = (
     *gnss_errors(),
     *photograph_fields(),
     *ray_correlation(),
+    *_precision(),
     Item("rigs[]", "object", "Cameras on rigs; where there are any.", optional=True),
     *within("rigs[]", *RIGS),
     Item("rigs[].correlations[]", "object", "Correlations of the six elements, one entry an element."),

@@ -21,6 +21,7 @@ EFFECTS = {
     "external": "Largest effect of an undetected error of {} on any result, in standard deviations of that result.",
 }
 WHERE_MODEL = " Only where groups of photographs share errors."
+RELATIVE = "Total standard deviation of {} relative to the whole block: after a similarity of all points."
 
 
 def with_totals(model: str, total: str, what: str, unit: str, axes: Sequence[str] = AXES) -> tuple[Item, ...]:
@@ -31,6 +32,11 @@ def with_totals(model: str, total: str, what: str, unit: str, axes: Sequence[str
         *of_axes(total, "number?", whole, unit, axes),
     )
     return tuple(replace(item, optional=True) for item in found)
+
+
+def _relative(name: str, what: str) -> tuple[Item, ...]:
+    """Columns of σ after a similarity of the whole block, where the adjustment has a final σ0."""
+    return tuple(replace(item, optional=True) for item in of_axes(name, "number?", RELATIVE.format(what), "m"))
 
 
 STATUS = Item("status", "text", "Whether it took part in the adjustment.", values=POINT_STATUS)
@@ -53,6 +59,7 @@ IMAGES = (
         "Why it was set aside.",
         values={name: REASONS[name][0] for name in (*PHOTOGRAPH_REASONS.values(), "no image points")},
     ),
+    *_relative("x_r{}0", "{}0"),
     *of_axes("x_s_{}_mgon", "number?", "Standard deviation of {}.", "mgon", ANGLES),
 )
 POINTS = (
@@ -69,6 +76,7 @@ POINTS = (
         "Why it was set aside.",
         values={name: REASONS[name][0] for name in (*POINT_REASONS.values(), "not measured")},
     ),
+    *_relative("x_r{}", "{}"),
 )
 
 

@@ -26,6 +26,12 @@ HEAD_BESIDE_CRS = (
 )
 HEAD = (*HEAD_BESIDE_CRS, CRS)
 """What the JSON file of every result begins with."""
+GOOD_FOR = {
+    "absolute": "positions and heights in the coordinate system, and the shape",
+    "relative": "the shape alone: lengths, height differences, volumes",
+    "neither": "neither of them",
+    "": "not known",
+}
 ADJUSTED = (
     Item("adjusted", "object", "The adjustment that photographs were oriented by."),
     Item(
@@ -33,6 +39,9 @@ ADJUSTED = (
         values={"accepted": "", "doubtful": "", "rejected": ""},
     ),
     Item("adjusted.reason", "text", "The first reason for the verdict; empty where it is accepted."),
+    Item("adjusted.good_for", "text", "What it is good for.", values=GOOD_FOR),
+    Item("adjusted.purpose", "text", "The same in a sentence or two, with the numbers; empty where it is not known."),
+    Item("adjusted.scale", "number?", "σ of the scale of the whole block: 0.01 is 1 % of a length, 3 % of a volume."),
     Item("adjusted.control_points", "whole", "Its control points."),
     Item("adjusted.check_points", "whole", "Its check points."),
     Item("adjusted.rms_check_m", "object", "RMS of the differences at its check points.", "m"),

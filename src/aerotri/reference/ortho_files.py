@@ -59,6 +59,13 @@ ORTHO_JSON = (
         "m",
     ),
     *_quantiles("sigma_m.image", "From the measurement of an image point.", "m"),
+    *_quantiles(
+        "sigma_m.relative",
+        "All parts together, relative to the whole orthophoto: after a similarity (shift, rotation, scale) of it; for "
+        "lengths and areas. Null where the surface has another adjustment.",
+        "m",
+        "object?",
+    ),
     *_quantiles("viewing_angle_deg", "Angle of the ray off the vertical.", "deg"),
     Item("seams", "object", "Seams between photographs, on the coarse grid on which they are laid."),
     Item("seams.length_m", "number", "Their length.", "m"),

@@ -21,11 +21,12 @@ PRINTED_WORDS = (
     ),
     Word(
         "RMSE_H", "aerotri adjust",
-        "Horizontal root mean square error: √(RMS_X² + RMS_Y²) of the differences at control or check points, m.",
+        "Horizontal root mean square error at the check points, √(RMSE_X² + RMSE_Y²), with the error of their survey: "
+        "RMSE = √(RMS² + survey²) by coordinate (ASPRS, edition 2). The RMS alone is called in plan.",
     ),
     Word(
         "RMSE_V", "aerotri adjust",
-        "Vertical root mean square error: the RMS of the differences in Z at control or check points, m.",
+        "Vertical root mean square error at the check points, with the error of their survey: √(RMS_Z² + survey²).",
     ),
     Word(
         "RMSE_3D", "aerotri accuracy", "Root mean square error in space: √(RMSE_H² + RMSE_V²), with the survey error.",

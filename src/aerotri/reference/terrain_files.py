@@ -100,6 +100,14 @@ DSM_JSON = (
     Item("sigma_Z_m.matching", "number", "From matching alone.", "m"),
     Item("sigma_Z_m.adjustment", "number", "From the adjustment alone, which neighbouring cells share.", "m"),
     Item(
+        "sigma_Z_m.relative",
+        "number",
+        "Of a cell relative to the whole surface: after a similarity (shift, rotation, "
+        "scale) of it; for shape and volumes.",
+        "m",
+    ),
+    Item("sigma_Z_m.adjustment_relative", "number", "Of it from the adjustment alone.", "m"),
+    Item(
         "noise_length_m",
         "number?",
         "Side of the square whose cells have one noise, as neighbours share it; null where no two pairs overlap.",

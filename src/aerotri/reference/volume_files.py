@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from aerotri.reference.head import ARGUMENTS, HEAD
+from dataclasses import replace
+
+from aerotri.reference.head import ADJUSTED, ARGUMENTS, HEAD
 from aerotri.reference.records import DescribedFile, Item
 from aerotri.volume.accuracy import BRIDGED, LASTING, MODEL, PARTS
 from aerotri.volume.settings import METHODS
@@ -116,11 +118,19 @@ VOLUME_JSON = (
     Item("dtm", "text", "File of the surface."),
     Item("base", "object", "The base."),
     Item("base.name", "text", "What it is, in words."),
+    Item(
+        "base.follows_surface",
+        "yes/no",
+        "Whether it follows from the surface along the boundary: a shift or a tilt "
+        "of the whole block then cancels in the volume.",
+    ),
     Item("base.z0_m", "number", "Of a plane: height at x0, y0.", "m", optional=True),
     Item("base.x0_m", "number", "Of a plane: X of its point.", "m", optional=True),
     Item("base.y0_m", "number", "Of a plane: Y of its point.", "m", optional=True),
     Item("base.slope_x", "number", "Of a plane: slope along X.", "m/m", optional=True),
     Item("base.slope_y", "number", "Of a plane: slope along Y.", "m/m", optional=True),
+    replace(ADJUSTED[0], kind="object?", text="The adjustment that the surface was measured with; null without one."),
+    *ADJUSTED[1:],
     *ARGUMENTS,
     Item("boundary", "object", "The boundary."),
     Item("boundary.name", "text", "File or text it comes from."),

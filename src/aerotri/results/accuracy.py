@@ -13,6 +13,16 @@ Met = Literal["met", "not met", "cannot be said"]
 Weight = Literal["required", "recommended"]
 
 
+def with_survey(fit: float, survey: float) -> float:
+    """m, RMSE of a coordinate: the fit to the check points and the error of their survey [L: ASPRS edition 2, 7.11]."""
+    return float(np.hypot(fit, survey))
+
+
+def in_plan(of_x: float, of_y: float) -> float:
+    """m, √(X² + Y²). RMSE_H is that of the RMSE, which have the survey error; that of the fit has another name."""
+    return float(np.hypot(of_x, of_y))
+
+
 @dataclass(frozen=True, eq=False)
 class CheckedPoints:
     """Check points of a result, k of them.
@@ -77,7 +87,7 @@ class CoordinateErrors:
     @property
     def rmse(self) -> float:
         """m, the fit with the survey error included."""
-        return float(np.hypot(self.fit, self.survey))
+        return with_survey(self.fit, self.survey)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +181,7 @@ class AccuracyRecord:
     @property
     def rmse_h(self) -> float:
         """m, √(RMSE_X² + RMSE_Y²)."""
-        return float(np.hypot(self.errors[0].rmse, self.errors[1].rmse))
+        return in_plan(self.errors[0].rmse, self.errors[1].rmse)
 
     @property
     def nva(self) -> float:

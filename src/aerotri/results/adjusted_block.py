@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from aerotri.results.photograph_fields import PhotographFields
     from aerotri.results.position_errors import PositionErrors
     from aerotri.results.ray_correlation import RayCorrelation
+    from aerotri.results.relative import RelativePrecision
     from aerotri.results.removal import Removal
     from aerotri.results.rigidity import Rigidity
     from aerotri.results.rigs import MountedCamera, RigMovements
@@ -40,6 +41,8 @@ class Outcome:
     observations, unknowns, conditions, redundancy : redundancy = observations − unknowns + conditions.
     warnings : sentences the user should read. notes : sentences about what the program chose by itself.
     verdict : 'accepted', 'doubtful' or 'rejected'; '' before it is judged. reasons : sentences, the gravest first.
+    good_for : 'absolute', 'relative' or 'neither', '' where that is not known. purpose : the same in a sentence or two,
+        with the numbers.
     timings_s : seconds by stage. computed : when.
     """
 
@@ -59,6 +62,8 @@ class Outcome:
     reasons: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     computed: datetime = field(default_factory=now)
+    good_for: str = ""
+    purpose: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,7 +340,8 @@ class AdjustedBlock:
     how they move on weighted rigs.
     `deviations` says how much parameters differ between groups of photographs that are tied to one another,
     `ray_correlation` how much neighbouring rays of a photograph err alike, `common_shift` what all observed positions
-    are shifted against the control points, `photograph_fields` how much photographs have smooth errors of their own.
+    are shifted against the control points, `photograph_fields` how much photographs have smooth errors of their own,
+    `relative` the σ of the shape of the block.
     """
 
     block: Block
@@ -362,6 +368,7 @@ class AdjustedBlock:
     ray_correlation: RayCorrelation | None = None
     common_shift: CommonShift | None = None
     photograph_fields: PhotographFields | None = None
+    relative: RelativePrecision | None = None
 
 
 def head_of(adjusted: AdjustedBlock) -> Head:

@@ -6,6 +6,9 @@ in the inner datum of a free block where the block has it, as its points.
 Where groups of photographs share errors it has a model part. Where the residuals show that the parameters leave image
 errors it has the part of these, through the orientation and at the rays of the picket itself
 (`statistics.camera_field`). It changes slowly over the ground: some pickets tell it for all.
+
+[D] The shape of a surface has the covariance of what a similarity of all its places leaves (see `statistics.relative`):
+J − G·A in place of J, G (n, 3, 7) the motions of a similarity at the places, A = (GᵀG)⁻¹Gᵀ·J.
 """
 
 from __future__ import annotations
@@ -14,6 +17,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from aerotri.adjustment.datum import motions_of_points
+from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.deformation.error_parameters import error_rows, shared_columns
 from aerotri.deformation.model_grid import places_of
 from aerotri.deformation.orientation import Orientation
@@ -25,6 +30,7 @@ from aerotri.statistics.camera_field import CameraField, is_of_camera
 from aerotri.statistics.covariance import inner_datum, is_inner
 from aerotri.statistics.image_sigma import weight_of_cameras
 from aerotri.statistics.model_of_functions import model_of_functions
+from aerotri.statistics.relative import DEGENERATE, MOTIONS
 from aerotri.terrain.pickets import Pickets
 
 MOST_PLACES, AT_A_TIME = 500, 100
@@ -81,6 +87,48 @@ def covariances_at(
         return _by_unknowns(calibration, restitution, rows, local[part], photographs[part], plan=False)
 
     return _covariances(calibration, restitution.left, local, partials, 3)
+
+
+def both_covariances_at(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photographs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `covariances_at`, and the same after a similarity of all the places: of the shape of the surface."""
+    local = places_of(calibration).to_local(xyz)
+
+    def partials(part: slice) -> np.ndarray:
+        return _by_unknowns(calibration, restitution, rows, local[part], photographs[part], plan=False)
+
+    return _both(calibration, restitution.left, local, partials, motions_of_points(local - local.mean(axis=0)))
+
+
+def _both(
+    calibration: Adjustment, left: CameraField | None, local: np.ndarray, partials: Callable[[slice], np.ndarray],
+    motions: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """The covariances of `_covariances`, and those of what a similarity of all the places leaves.
+
+    Parameters
+    ----------
+    motions : (n, size, 7) what the similarity does to the vectors; it is determined by their last three coordinates.
+    """
+    size = motions.shape[1]
+    factor = calibration.system.factorise(calibration.solution.equations)
+    of_shape = _of_shape(motions, partials)
+    absolute = _covariances(calibration, left, local, partials, size, factor)
+    return absolute, _covariances(calibration, left, local, of_shape, size, factor)
+
+
+def _of_shape(motions: np.ndarray, partials: Callable[[slice], np.ndarray]) -> Callable[[slice], np.ndarray]:
+    """The partials (k, size, u + f) less those of the similarity of all places."""
+    g = np.ascontiguousarray(motions[:, -3:]).reshape(-1, MOTIONS)
+    size = np.linalg.norm(g, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    onto = (np.linalg.pinv(g / size, rcond=DEGENERATE) / size[:, None]).reshape(MOTIONS, len(motions), 3)
+    similarity: np.ndarray | float = 0.0
+    for first in range(0, len(motions), AT_A_TIME):
+        part = slice(first, first + AT_A_TIME)
+        similarity = similarity + np.tensordot(onto[:, part], partials(part)[:, -3:], axes=2)
+    return lambda part: partials(part) - motions[part] @ similarity
 
 
 def change_covariances(
@@ -151,8 +199,10 @@ def plan_of_images(
 def shown_covariances(
     calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photograph: np.ndarray,
     measured_by: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """(n, 6, 6) m² in the CRS, what the adjustment does to details in an orthophoto and to the surface below it.
+
+    And the same after a similarity of all the places, as of `both_covariances_at`.
 
     [D] A surface that was measured with the same orientation moves by e = J_e·dx, as points that are intersected do. A
     detail that is shown at a known height moves by J_p·dx, and by t·e_Z more as the height is e_Z too high, t the
@@ -174,12 +224,15 @@ def shown_covariances(
         surface = _by_unknowns(calibration, restitution, rows, local[part], measured_by[part], plan=False)
         return np.concatenate([shown + along[part, :, None] * surface[:, 2:], surface], axis=1)
 
-    return _covariances(calibration, restitution.left, local, partials, 6)
+    of_surface = motions_of_points(local - local.mean(axis=0))
+    # a similarity moves a detail along with the surface; a third coordinate is not shown
+    of_shown = of_surface * np.array([1.0, 1.0, 0.0])[:, None]
+    return _both(calibration, restitution.left, local, partials, np.concatenate([of_shown, of_surface], axis=1))
 
 
 def _covariances(
     calibration: Adjustment, left: CameraField | None, local: np.ndarray, partials: Callable[[slice], np.ndarray],
-    size: int,
+    size: int, factor: Factor | None = None,
 ) -> np.ndarray:  # fmt: skip
     """(n, size, size) m² in the CRS of vectors of three coordinates, one behind the other.
 
@@ -187,9 +240,10 @@ def _covariances(
     ----------
     left : what the parameters leave of image errors. local : (n, 3) m in the frame.
     partials : (k, size, u + f) of some places, by the unknowns of the reduced system, then by the patterns of `left`.
+    factor : of the system, where it is known.
     """
     system, solution = calibration.system, calibration.solution
-    frame, factor = places_of(calibration), system.factorise(solution.equations)
+    frame, factor = places_of(calibration), factor or system.factorise(solution.equations)
     inner = inner_datum(system, solution.state, factor, solution.estimator) if is_inner(system) else None
     count = 6 * len(system.unknowns.images) + len(system.unknowns.shared)
     covariances = np.empty((len(local), size, size))

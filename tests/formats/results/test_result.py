@@ -24,10 +24,12 @@ COLUMNS = {
 }
 RESIDUALS = "image, point, x, y, vx, vy, rx, ry, wx, wy, weight, status"
 KEYS = (
-    "aerotri, computed, project, crs, crs_name, height_system, block, status, verdict, reasons, message, iterations, "
+    "aerotri, computed, project, crs, crs_name, height_system, block, status, verdict, reasons, good_for, purpose, "
+    "message, iterations, "
     "sigma0, sigma0_um, vtpv, observations, "
     "unknowns, conditions, redundancy, groups, check_points, control_points, additional_parameters, cameras, blunders, "
-    "deviations, model_part, gnss_errors, photograph_fields, ray_correlation, settings, notes, warnings, timings_s"
+    "deviations, model_part, gnss_errors, photograph_fields, ray_correlation, precision, settings, notes, warnings, "
+    "timings_s"
 )
 ENTRY_KEYS = {
     "groups": "name, count, sigma_apriori, rms, redundancy, sigma_aposteriori",

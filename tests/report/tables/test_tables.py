@@ -47,8 +47,10 @@ def test_ground_statistics_by_hand(adjusted):
     np.testing.assert_allclose(s.mean, [0.1, 0.2, -0.2])
     np.testing.assert_allclose(s.max, [0.3, 0.4, 0.2])
     np.testing.assert_allclose(s.expected, np.hypot(0.03, 0.05))
-    assert s.rmse_h == pytest.approx(np.sqrt(0.13))
-    assert s.rmse_v == pytest.approx(0.2)
+    assert s.fit_h == pytest.approx(np.sqrt(0.13))
+    np.testing.assert_allclose(s.survey, 0.05)
+    assert s.rmse_h == pytest.approx(np.sqrt(0.13 + 2.0 * 0.05**2))
+    assert s.rmse_v == pytest.approx(np.hypot(0.2, 0.05))
 
 
 def test_expected_residuals_of_control_points(adjusted):
@@ -61,10 +63,11 @@ def test_expected_residuals_of_control_points(adjusted):
 def test_accuracy_table(adjusted):
     one = by_hand(adjusted, [[0.3, 0.4, -0.2], [-0.1, 0.0, np.nan]])
     table = tables.ground_accuracy(one, one.check, "check")
-    assert column(table, "coordinate")[0] == ["X", "Y", "Z", "horizontal (RMSE_H)", "vertical (RMSE_V)"]
-    assert column(table, "RMS")[1] == ["0.224", "0.283", "0.200", "0.361", "0.200"]
+    with_survey = [f"RMSE_{axis}, survey error included" for axis in "HV"]
+    assert column(table, "coordinate")[0] == ["X", "Y", "Z", "in plan", *with_survey]
+    assert column(table, "RMS")[1] == ["0.224", "0.283", "0.200", "0.361", "0.367", "0.206"]
     assert column(table, "largest")[1][3] == "0.500"
-    assert column(table, "mean")[1] == ["+0.100", "+0.200", "-0.200", "–", "-0.200"]
+    assert column(table, "mean")[1] == ["+0.100", "+0.200", "-0.200", "–", "–", "–"]
     assert table.columns[2].unit == "m"
 
 
@@ -96,11 +99,11 @@ def test_sigma0_beside_its_band(adjusted):
 
 def test_check_points_beside_their_sigma(adjusted):
     """Ten coordinates expected at 5.8 cm: χ²(10) 97.5 % is 20.48, so at most 8.3 cm."""
-    good = finding(by_hand(adjusted, np.full((10, 3), 0.05)), "RMSE_V")
+    good = finding(by_hand(adjusted, np.full((10, 3), 0.05)), "fit in height")
     assert good.level == "good"
     assert good.value == "0.050 m"
     assert "0.058 m from the σ; at most 0.083 m" in good.expected
-    assert finding(by_hand(adjusted, np.full((10, 3), 0.09)), "RMSE_V").level == "attention"
+    assert finding(by_hand(adjusted, np.full((10, 3), 0.09)), "fit in height").level == "attention"
 
 
 def test_bias_at_check_points(adjusted):

@@ -12,10 +12,12 @@ from aerotri.results.adjusted_block import AdjustedBlock
 
 def adjusted_json(adjusted: AdjustedBlock) -> dict[str, Any]:
     """Its verdict, the first reason for it, and its control and check points."""
-    o = adjusted.outcome
+    o, relative = adjusted.outcome, adjusted.relative
     return {
-        "verdict": o.verdict, "reason": next(iter(o.reasons), ""), "control_points": len(adjusted.control),
-        "check_points": len(adjusted.check), "rms_check_m": _rms(adjusted.check.difference),
+        "verdict": o.verdict, "reason": next(iter(o.reasons), ""), "good_for": o.good_for, "purpose": o.purpose,
+        "scale": None if relative is None else number_or_none(relative.scale),
+        "control_points": len(adjusted.control), "check_points": len(adjusted.check),
+        "rms_check_m": _rms(adjusted.check.difference),
     }  # fmt: skip
 
 

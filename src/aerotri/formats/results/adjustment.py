@@ -38,6 +38,7 @@ from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Ou
 from aerotri.results.head import Head
 from aerotri.results.model_part import ModelPart
 from aerotri.results.ray_correlation import RayCorrelation
+from aerotri.results.relative import precision_json
 from aerotri.results.rolling_shutter import Motions
 from aerotri.statistics.set_aside import photograph_reasons, point_reasons, status_columns
 
@@ -107,11 +108,19 @@ def adjustment_json(adjusted: AdjustedBlock) -> dict[str, Any]:
         "gnss_errors": None if adjusted.position_errors is None else adjusted.position_errors.as_dict(),
         "photograph_fields": None if adjusted.photograph_fields is None else adjusted.photograph_fields.as_dict(),
         "ray_correlation": (adjusted.ray_correlation or RayCorrelation(reason=NOT_LOOKED_FOR)).as_dict(),
+        "precision": both_precisions(adjusted),
         **({"rigs": rigs_json(adjusted.rigs)} if adjusted.rigs else {}),
         **({} if adjusted.rig_movements is None else {"rig_movements": movements_json(adjusted.rig_movements)}),
         **({} if adjusted.rigidity is None else {"rigidity": rigidity_json(adjusted.rigidity)}),
         **_rolling_shutters(adjusted),
     }
+
+
+def both_precisions(adjusted: AdjustedBlock) -> dict[str, Any]:
+    """Absolute and relative σ side by side, as adjustment.json has them."""
+    relative = adjusted.relative
+    free = relative is not None and not np.isfinite(relative.position).all()
+    return precision_json(relative, adjusted.points.total_sigma, adjusted.images.total_sigma[:, :3], free)
 
 
 def _rolling_shutters(adjusted: AdjustedBlock) -> dict[str, Any]:
@@ -138,6 +147,8 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
         "status": o.status,
         "verdict": o.verdict,
         "reasons": list(o.reasons),
+        "good_for": o.good_for,
+        "purpose": o.purpose,
         "message": o.message,
         "iterations": int(o.iterations),
         "sigma0": number_or_none(o.sigma0),
@@ -158,6 +169,7 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
         "gnss_errors": None,
         "photograph_fields": None,
         "ray_correlation": RayCorrelation(reason=NOT_LOOKED_FOR).as_dict(),
+        "precision": precision_json(None, coordinates, coordinates, free=False),
         "settings": [dataclasses.asdict(one) for one in used_settings(block)],
         "notes": list(o.notes),
         "warnings": list(o.warnings),
@@ -182,6 +194,8 @@ def image_columns(adjusted: AdjustedBlock) -> dict[str, np.ndarray]:
             columns |= _split((f"{letter}_omega", f"{letter}_phi", f"{letter}_kappa"), np.degrees(values[:, 3:]))
     columns["rays"] = images.rays
     columns |= status_columns(photograph_reasons(adjusted))
+    if adjusted.relative is not None:
+        columns |= _split(("x_rX0", "x_rY0", "x_rZ0"), adjusted.relative.centres)
     return columns | _split(("x_s_omega_mgon", "x_s_phi_mgon", "x_s_kappa_mgon"), sigma[:, 3:] * MGON_PER_RADIAN)
 
 
@@ -193,8 +207,10 @@ def point_columns(adjusted: AdjustedBlock) -> dict[str, np.ndarray]:
     if points.model is not None:
         columns |= _split(("mX", "mY", "mZ"), _root_of_diagonal(points.model))
         columns |= _split(("tX", "tY", "tZ"), points.total_sigma)
-    columns |= {"rays": points.rays, "max_abs_w": points.max_abs_w}
-    return columns | status_columns(point_reasons(adjusted))
+    columns |= {"rays": points.rays, "max_abs_w": points.max_abs_w} | status_columns(point_reasons(adjusted))
+    if adjusted.relative is not None:
+        columns |= _split(("x_rX", "x_rY", "x_rZ"), adjusted.relative.points)
+    return columns
 
 
 def parameter_columns(adjusted: AdjustedBlock) -> dict[str, np.ndarray]:

@@ -16,7 +16,7 @@ from aerotri.version import __version__
 def dense_json(outcome: DenseOutcome, block: str, crs: str, ground: BareGround | None = None) -> dict[str, Any]:
     """The content of dsm.json."""
     o = outcome
-    sigma, matching, shared, count = (np.concatenate(part) for part in zip(*_samples(o), strict=True))
+    sigma, matching, shared, left, count = (np.concatenate(part) for part in zip(*_samples(o), strict=True))
     noise = o.shared_cells * o.grid.cell_x if np.isfinite(o.shared_cells) else None
     gsd = float(np.median(o.photographs.gsd))
     lasting, length = lasting_errors(o.pixel, gsd * 2**o.level)
@@ -30,7 +30,8 @@ def dense_json(outcome: DenseOutcome, block: str, crs: str, ground: BareGround |
         "photographs_mean": float(count.mean()),
         "sigma_Z_m": {
             "median": float(np.median(sigma)), "matching": float(np.median(matching)),
-            "adjustment": float(np.median(shared)),
+            "adjustment": float(np.median(shared)), "relative": float(np.median(np.hypot(matching, left))),
+            "adjustment_relative": float(np.median(left)),
         },
         "noise_length_m": noise,
         "matching_shared": {"sigma_Z_m": lasting, "length_m": length, "parallax_px": LASTING_PX},
@@ -52,7 +53,7 @@ def _ground(ground: BareGround) -> dict[str, Any]:
 
 
 def _samples(o: DenseOutcome) -> list[tuple[np.ndarray, ...]]:
-    """σ, that of matching, that of the adjustment, and photographs, of some of the cells that have a height."""
+    """σ, that of matching, of the adjustment, of it after a similarity, and photographs, of some of the cells."""
     found = []
     # one step for all tiles: else those with few cells would count more than others
     every = max(-(-o.cells // MOST_SAMPLES), 1)
@@ -62,8 +63,9 @@ def _samples(o: DenseOutcome) -> list[tuple[np.ndarray, ...]]:
         row, column = row[::every].copy(), column[::every].copy()
         if len(row):
             grid = o.grid.window(window.row, window.column, window.rows, window.columns)
-            shared, matching = o.shared.over(grid)[row, column], tile.sigma[row, column].astype(float)
-            found.append((np.hypot(matching, shared), matching, shared, tile.count[row, column]))
+            shared, left = o.shared.over(grid)[row, column], o.shared.relative_over(grid)[row, column]
+            matching = tile.sigma[row, column].astype(float)
+            found.append((np.hypot(matching, shared), matching, shared, left, tile.count[row, column]))
     return found
 
 

@@ -67,6 +67,7 @@ def ortho_json(outcome: OrthoOutcome, block: Block, surface: str, resampling: st
         "sigma_m": {
             "total": _quantiles(a.total), "surface": None if a.surface is None else _quantiles(a.surface),
             "orientation": _quantiles(a.orientation), "image": _quantiles(a.image),
+            "relative": None if a.relative is None else _quantiles(a.relative),
         },
         "viewing_angle_deg": _quantiles(np.degrees(np.arctan(a.tangent))),
         "seams": {

@@ -13,7 +13,7 @@ from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 
 
 def accuracy_table(adjusted: AdjustedBlock, words: Words) -> Part:
-    """RMS, mean and largest difference at control and check points, with RMSE_H and RMSE_V."""
+    """RMS, mean and largest difference at control and check points, by coordinate and in plan."""
     rows: list[tuple[str, ...]] = []
     for key, points in (("check", adjusted.check), ("control", adjusted.control)):
         if not len(points):
@@ -23,9 +23,8 @@ def accuracy_table(adjusted: AdjustedBlock, words: Words) -> Part:
         for k, axis in enumerate("XYZ"):
             rows.append((name, axis, words.whole(s.count[k]), words.number(s.rms[k], d), words.number(s.expected[k], d),
                          words.number(s.mean[k], d, signed=True), words.number(s.max[k], d)))  # fmt: skip
-        horizontal = float(np.hypot(s.expected[0], s.expected[1]))
         rows.append((name, words("accuracy.horizontal"), words.whole(min(s.count[0], s.count[1])),
-                     words.number(s.rmse_h, d), words.number(horizontal, d), "", ""))  # fmt: skip
+                     words.number(s.fit_h, d), words.number(s.expected_h, d), "", ""))  # fmt: skip
     keys = ("points", "coordinate", "count", "rms", "expected", "mean", "largest")
     return table([words(f"accuracy.{key}") for key in keys], rows, words=2)
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from jinja2 import PackageLoader
 from markupsafe import Markup
 from matplotlib.figure import Figure
@@ -21,6 +22,7 @@ from aerotri import diagnosis
 from aerotri.crosscheck import CrosscheckResult
 from aerotri.diagnosis import Finding
 from aerotri.diagnosis.free_verdict import in_words
+from aerotri.diagnosis.purpose import beside_verdict, plus_minus
 from aerotri.diagnosis.work_list import WorkList, work_list
 from aerotri.image_errors import Change
 from aerotri.report import quality
@@ -40,6 +42,7 @@ from aerotri.report.tables.cameras_elsewhere import elsewhere_tables
 from aerotri.report.tables.settings import settings_table
 from aerotri.results.adjusted_block import AdjustedBlock, head_of
 from aerotri.results.parameter_comparison import ParameterComparison
+from aerotri.results.relative import medians
 from aerotri.statistics.parameter_effects import ParameterEffects
 from aerotri.statistics.photograph_residuals import photograph_residuals
 from aerotri.statistics.position_differences import position_differences
@@ -183,6 +186,9 @@ def page_content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], bes
         "head": page_head(head_of(adjusted)),
         "outcome": adjusted.outcome,
         "reasons": [quality.printable(reason, 1000) for reason in adjusted.outcome.reasons],
+        "but": beside_verdict(adjusted.outcome.verdict, adjusted.outcome.good_for),
+        "purpose": quality.printable(adjusted.outcome.purpose, 1000),
+        "similarity": precision_tables.similarity_in_words(adjusted),
         "what_to_do": [
             text.replace("what", "What", 1).replace("`", "") for text in tables.what_to_do(adjusted.outcome)
         ],
@@ -284,6 +290,7 @@ def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
         "shutter_test": shutter_tables.shutter_test_table(adjusted),
         "parameters": tables.parameters(adjusted),
         "correlations": precision_tables.correlations(adjusted),
+        "relative": precision_tables.relative(adjusted),
         "precision": precision_tables.precision(adjusted),
         "ellipsoids": precision_tables.ellipsoids(adjusted),
         "orientation_correlations": precision_tables.orientation_correlations(adjusted),
@@ -304,11 +311,24 @@ def _cards(adjusted: AdjustedBlock) -> list[tuple[str, str, str]]:
     for heading, results in (("Check points", adjusted.check), ("Control points", adjusted.control)):
         if len(results):
             s, d = quality.ground_statistics(adjusted, results), quality.metre_digits(results.sigma)
-            cards.append(
-                (f"{heading} ({len(results)})", f"{s.rmse_h:.{d}f} / {s.rmse_v:.{d}f} m", "RMSE horizontal / vertical")
-            )
+            of = (s.rmse_h, s.rmse_v) if results is adjusted.check else (s.fit_h, s.rms[2])
+            what = "RMSE_H / RMSE_V, survey included" if results is adjusted.check else "RMS in plan / in height"
+            cards.append((f"{heading} ({len(results)})", f"{of[0]:.{d}f} / {of[1]:.{d}f} m", what))
+    cards += _sigma_card(adjusted)
     cards.append(("Redundancy", f"{o.redundancy}", f"of {o.observations} observations"))
     return cards
+
+
+def _sigma_card(adjusted: AdjustedBlock) -> list[tuple[str, str, str]]:
+    """σ of heights in the coordinate system, and of the shape."""
+    found = adjusted.relative
+    if found is None or not np.isfinite(found.medians).all():
+        return []
+    left = plus_minus(found.medians[2]).removeprefix("± ")
+    if not np.isfinite(found.position).all():
+        return [("σ of heights, relative", left, "of the shape, median of the points")]
+    place = plus_minus(medians(adjusted.points.total_sigma)[2]).removeprefix("± ")
+    return [("σ of heights (median)", f"{place} / {left}", "in the coordinate system / relative")]
 
 
 def _embedded(name: str, plot: RenderedPlot) -> dict[str, str]:

@@ -13,6 +13,7 @@ from aerotri.report.pages.product import (
     metres,
     percent,
     round_length,
+    shape_in_words,
     whole,
 )
 from aerotri.report.quality import many_cells, printable
@@ -61,7 +62,14 @@ def _doubts(c: Mapping[str, Any]) -> list[str]:
 def _cards(c: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     s = c["sigma_Z_m"]
     return [
-        ("σ of a height", metres(s["median"]), "median of the cells, one standard deviation"),
+        ("σ of a height", metres(s["median"]), "above the datum; median of the cells, one standard deviation"),
+        *(
+            ()
+            if s.get("relative") is None
+            else (
+                ("σ of a height, relative", metres(s["relative"]), "of the shape: for volumes and height differences"),
+            )
+        ),
         ("of matching alone", metres(s["matching"]), "median; the rest comes from the adjustment"),
         ("Measured", percent(c["coverage"]), "of the ground that pairs of photographs show"),
         (
@@ -89,7 +97,11 @@ def _sure(c: Mapping[str, Any]) -> list[str]:
         f" {metres(lasting['sigma_Z_m'])} of the errors of matching hold over {metres(lasting['length_m'])} "
         "and do not average out. aerotri volume and change count all these parts."
     )
-    return [part for part in (text, check_in_words(c)) if part]
+    shape = "" if s.get("relative") is None else (
+        f"Relative to the whole surface half of the heights are known to {metres(s['relative'])} or better, "
+        f"{metres(s['adjustment_relative'])} of it from the adjustment. {shape_in_words('surface', c)}"
+    )  # fmt: skip
+    return [part for part in (text, shape, check_in_words(c)) if part]
 
 
 def _numbers(c: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -107,6 +119,14 @@ def _numbers(c: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("σ of heights, median", metres(s["median"])),
         ("by matching alone, median", metres(s["matching"])),
         ("by the adjustment, which cells share, median", metres(s["adjustment"])),
+        *(
+            ()
+            if s.get("relative") is None
+            else (
+                ("σ of heights relative to the whole surface, median", metres(s["relative"])),
+                ("by the adjustment, median", metres(s["adjustment_relative"])),
+            )
+        ),
         ("Noise length: cells within it share the noise of matching", metres(noise)),
         ("Errors of matching that do not average out", metres(c["matching_shared"]["sigma_Z_m"])),
         ("Length over which their correlation falls to 1/e", metres(c["matching_shared"]["length_m"])),

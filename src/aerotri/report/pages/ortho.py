@@ -15,6 +15,7 @@ from aerotri.report.pages.product import (
     metres,
     percent,
     round_length,
+    shape_in_words,
     whole,
 )
 from aerotri.report.quality import many_cells, printable, two_digits
@@ -53,10 +54,11 @@ def _doubts(c: Mapping[str, Any]) -> list[str]:
 
 
 def _cards(c: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    total, area = c["sigma_m"]["total"], c["area_m2"]
+    total, area, left = c["sigma_m"]["total"], c["area_m2"], c["sigma_m"].get("relative")
     return [
-        ("σ of X and of Y", metres(total["median"]), "median, one standard deviation"),
-        ("95 % of the area", metres(total["q95"]), "σ is at most"),
+        ("σ of X and of Y", metres(total["median"]), "in the coordinate system; median, one standard deviation"),
+        *(() if left is None else (("σ of X and of Y, relative", metres(left["median"]), "for lengths and areas"),)),
+        ("95 % of the area", metres(total["q95"]), "σ in the coordinate system is at most"),
         ("Area", f"{whole(area['orthophoto'])} m²", f"{percent(_share(area))} of the surface"),
         ("Cell", round_length(c["cell_m"]), f"{whole(c['columns'])} × {whole(c['rows'])} cells"),
     ]
@@ -78,9 +80,14 @@ def _sure(c: Mapping[str, Any]) -> list[str]:
         f"{metres(s['orientation']['median'])}, measurement in the photograph {metres(s['image']['median'])}; "
         f"{from_where}."
     )
+    left = s.get("relative")
+    shape = "" if left is None else (
+        f"Relative to the whole orthophoto σ is {metres(left['median'])} (95 % of the area: at most "
+        f"{metres(left['q95'])}). {shape_in_words('orthophoto', c)}"
+    )  # fmt: skip
     inside = sum(one["role"] == "check" for one in c["points"])
     where = f"{counted(inside, 'check point lies', 'check points lie')} in the orthophoto." if inside else ""
-    return [part for part in (text, " ".join(part for part in (check_in_words(c), where) if part)) if part]
+    return [part for part in (text, shape, " ".join(part for part in (check_in_words(c), where) if part)) if part]
 
 
 def _numbers(c: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -68,7 +68,7 @@ def _cards(r: PlanRecord) -> list[tuple[str, str, str]]:
     return [
         ("photographs", f"{len(r.flight)}", f"in {len(r.flight.strips)} strips"),
         ("flight", f"{r.flight.time[-1] / 60.0:.0f} min", f"{r.flight.length / 1000.0:.2f} km"),
-        ("RMSE_H, RMSE_V", f"{100.0 * horizontal:.1f}, {100.0 * vertical:.1f} cm", "expected over the area"),
+        ("in plan, in height", f"{100.0 * horizontal:.1f}, {100.0 * vertical:.1f} cm", "RMS expected over the area"),
         ("σ of Z", f"{100.0 * z:.1f} cm", "at most, on 95 % of the area"),
         ("control points", f"{len(r.control)}", f"{len(r.added)} added by the plan"),
     ]

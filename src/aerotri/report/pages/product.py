@@ -85,6 +85,22 @@ def verdict_in_words(content: Mapping[str, Any]) -> list[str]:
     return [f"The adjustment is doubtful{reason}."] if a.get("verdict") == "doubtful" else []
 
 
+def only_shape(content: Mapping[str, Any]) -> str:
+    """What the adjustment is good for where that is less than positions, '' else."""
+    a = content.get("adjusted") or {}
+    return printable(a["purpose"], 1000) if a.get("good_for") in ("relative", "neither") else ""
+
+
+def shape_in_words(what: str, content: Mapping[str, Any]) -> str:
+    """What a relative σ is good for; what : has it."""
+    scale = (content.get("adjusted") or {}).get("scale")
+    text = (
+        f"The relative σ is that of the shape: it holds after a shift, rotation and scale of the whole {what}. It is "
+        "for lengths and differences within it; the other is for places in the coordinate system."
+    )
+    return text if scale is None else f"{text} The scale is known to ± {two_digits(100.0 * scale)} %."
+
+
 def doubts_of_adjustment(content: Mapping[str, Any], large: Sequence[str] = ()) -> list[str]:
     """What the adjustment and its points leave open; then the notes on the input.
 
@@ -92,7 +108,8 @@ def doubts_of_adjustment(content: Mapping[str, Any], large: Sequence[str] = ()) 
     ----------
     content : of dsm.json or ortho.json. large : what is said of a large σ; a note that says the same is left out.
     """
-    a, found = content.get("adjusted") or {}, [*verdict_in_words(content), *map(sentence, large)]
+    a, shape = content.get("adjusted") or {}, only_shape(content)
+    found = [*verdict_in_words(content), *((shape,) if shape else ()), *map(sentence, large)]
     if a and not a["control_points"]:
         found.append("There are no control points: σ says how well position and height are known without them.")
     if a and not a["check_points"]:

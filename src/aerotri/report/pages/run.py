@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import counted
+from aerotri.diagnosis.accuracy_rules import cm
+from aerotri.diagnosis.purpose import beside_verdict
 from aerotri.report.pages.dense import dense_parts
 from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.pages.ortho import ortho_parts
@@ -127,9 +129,12 @@ def _read(path: Path) -> dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def _verdict(adjusted: Mapping[str, Any]) -> tuple[str, list[str]]:
-    """The verdict on the adjustment, '' where there is none, and its reasons."""
-    return str(adjusted.get("verdict", "")), [printable(str(reason), 1000) for reason in adjusted.get("reasons", [])]
+def _verdict(adjusted: Mapping[str, Any]) -> tuple[str, list[str], str, str]:
+    """The verdict on the adjustment, '' where there is none, its reasons, what it is good for, and a word on that."""
+    reasons = [printable(str(reason), 1000) for reason in adjusted.get("reasons", [])]
+    purpose = printable(str(adjusted.get("purpose", "")), 1000)
+    verdict = str(adjusted.get("verdict", ""))
+    return verdict, reasons, purpose, beside_verdict(verdict, str(adjusted.get("good_for", "")))
 
 
 def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
@@ -173,11 +178,12 @@ def _net(volume: Mapping[str, Any], sigma: float | None) -> str:
 def _accuracy(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     """RMSE at the check points, and what the standard says to them."""
     known = {"RMSE_H": "in plan", "RMSE_V": "in height", "VVA": "in height in vegetation"}
-    numbers = [f"{name} {100.0 * value:.1f} cm {text}" for name, text in known.items()
+    numbers = [f"{name} {cm(value)} {text}" for name, text in known.items()
                if (value := content["accuracy"].get(name)) is not None]  # fmt: skip
     said = {"met": "all that is required is met", "not met": "NOT all that is required is met",
             "cannot be said": "part of what is required cannot be said"}  # fmt: skip
-    words = f"{', '.join(numbers)}, at {counted(content['check_points'], 'check point')}"
+    included = ", survey error included" if numbers else ""
+    words = f"{', '.join(numbers)}{included}, at {counted(content['check_points'], 'check point')}"
     return [("Accuracy", f"{words}; ASPRS edition 2: {said[content['met']]}")]
 
 

@@ -7,9 +7,11 @@ from math import floor, log10
 from pathlib import Path
 from typing import Any
 
+from aerotri.diagnosis.purpose import PER_VOLUME
 from aerotri.formats.results.volume import beyond_of_side, boundary_in_words, sigma_of_side
 from aerotri.report.pages.adjustment import data_address
 from aerotri.report.pages.head import page_environment, page_head, settings_rows
+from aerotri.report.pages.product import only_shape
 from aerotri.report.plots.rendering import RenderedPlot
 from aerotri.report.quality import printable, two_digits, with_sigma
 from aerotri.results.head import Head
@@ -95,6 +97,7 @@ def _budget(c: Mapping[str, Any]) -> str:
         f"{two_digits(1e3 * s['sigma_mean_height_m'])} mm. The largest part is that of the {largest}. {s['pickets']} "
         f"heights with {s['rays']} rays went into it."
     )
+    text += _of_the_whole(c)
     bent = s["curvature"]
     if bent is not None:
         held, side = ("cut hills off", "more") if bent["value_m3"] >= 0.0 else ("fill hollows", "less")
@@ -112,6 +115,24 @@ def _budget(c: Mapping[str, Any]) -> str:
     if not s["systematic"]["variants"]:
         return text + " No image errors were estimated, so what they do to the volume is not known."
     return text
+
+
+def _of_the_whole(c: Mapping[str, Any]) -> str:
+    """What errors of the whole block do to the volume; '' in files of versions that did not say so."""
+    a = c.get("adjusted")
+    if not a:
+        return ""
+    text = " σ comes from the whole covariance of the adjustment, so that it holds what matters for a volume: "
+    text += (
+        "the base follows from the surface, and a shift or a tilt of the whole block cancels."
+        if c["base"].get("follows_surface")
+        else "errors of the whole block count as far as the base does not move with them."
+    )
+    if a["scale"] is not None:
+        length, volume = (two_digits(100.0 * share * a["scale"]) for share in (1.0, PER_VOLUME))
+        text += f" The scale of the block is known to ± {length} %, which is ± {volume} % of a volume; σ has it."
+    shape = only_shape(c)
+    return f"{text} The adjustment: {shape}" if shape else text
 
 
 def _more(value: float, sigma: float) -> str:

@@ -204,24 +204,20 @@ def parameters(adjusted: AdjustedBlock) -> Table:
 
 
 def ground_accuracy(adjusted: AdjustedBlock, results: GroundPointResults, title: str) -> Table:
-    """RMS, mean and largest difference by coordinate, with RMSE_H and RMSE_V."""
+    """RMS, mean and largest difference by coordinate and in plan; of check points RMSE_H and RMSE_V besides."""
     s = ground_statistics(adjusted, results)
     d = metre_digits(results.sigma)
-    horizontal = float(np.hypot(s.expected[0], s.expected[1]))
     largest_h = np.hypot(results.difference[:, 0], results.difference[:, 1])
     both = np.isfinite(largest_h)
     rows = [(axis, int(s.count[k]), s.rms[k], s.expected[k], s.mean[k], s.max[k]) for k, axis in enumerate("XYZ")]
-    rows += [
-        (
-            "horizontal (RMSE_H)",
-            int(both.sum()),
-            s.rmse_h,
-            horizontal,
-            None,
-            largest_h[both].max() if both.any() else None,
-        ),
-        ("vertical (RMSE_V)", int(s.count[2]), s.rmse_v, s.expected[2], s.mean[2], s.max[2]),
-    ]
+    rows.append(
+        ("in plan", int(both.sum()), s.fit_h, s.expected_h, None, largest_h[both].max() if both.any() else None)
+    )
+    if results is adjusted.check:
+        rows += [
+            (f"{name}, survey error included", int(n), rmse, None, None, None)
+            for name, n, rmse in (("RMSE_H", both.sum(), s.rmse_h), ("RMSE_V", s.count[2], s.rmse_v))
+        ]
     form, signed = f".{d}f", f"+.{d}f"
     columns = (
         Column("coordinate"),
@@ -336,6 +332,7 @@ def weak_images(adjusted: AdjustedBlock, top: int = TOP_WEAK) -> Table:
 def verdict_lines(outcome: Outcome) -> list[str]:
     """What the result is worth, and why: the first that is read."""
     first = [f"verdict: {outcome.verdict}"] if outcome.verdict else []
+    first += [f"  {printable(outcome.purpose, 500)}"] if outcome.purpose and outcome.verdict != "rejected" else []
     more = len(outcome.reasons) - MOST_REASONS
     rest = [f"  and {counted(more, 'more reason')}, see adjustment.json"] if more > 0 else []
     return first + [f"  because {printable(reason, 500)}" for reason in outcome.reasons[:MOST_REASONS]] + rest
@@ -375,7 +372,9 @@ def summary_lines(adjusted: AdjustedBlock) -> list[str]:
             s = ground_statistics(adjusted, results)
             d = metre_digits(results.sigma)
             rms = ", ".join(f"{axis} {value:.{d}f}" for axis, value in zip("XYZ", s.rms, strict=True))
-            accuracy = f"RMSE_H {s.rmse_h:.{d}f}, RMSE_V {s.rmse_v:.{d}f} m"
+            accuracy = f"in plan {s.fit_h:.{d}f} m"
+            if results is adjusted.check:
+                accuracy = f"RMSE_H {s.rmse_h:.{d}f}, RMSE_V {s.rmse_v:.{d}f} m with the survey error"
             lines.append(f"{counted(len(results), name)}: RMS {rms} m; {accuracy}")
     additional = (p.kinds == "additional") & np.isin(p.status, ("estimated", "weighted"))
     if additional.any():

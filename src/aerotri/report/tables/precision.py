@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.diagnosis.purpose import plus_minus
 from aerotri.report.quality import metre_digits
 from aerotri.report.tables.adjustment import Column, Table, table
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.relative import medians
 from aerotri.statistics.parameter_effects import ParameterEffects, rms_by_axis
 from aerotri.statistics.precision import (
     HIGH_CORRELATION,
@@ -48,6 +50,48 @@ def precision(adjusted: AdjustedBlock) -> Table:
         *((Column(axis, "m", form), [getattr(one, axis.lower()) for _, one in rows]) for axis in "XYZ"),
         (Column("of a coordinate", "m", form), [one.mean for _, one in rows]),
     )
+
+
+def relative(adjusted: AdjustedBlock) -> Table:
+    """Absolute and relative σ side by side, medians, with what each is good for; no rows where they are not known."""
+    columns = (Column("total σ, median"), *(Column(axis, "m", ".3g") for axis in "XYZ"), Column("good for"))
+    found = adjusted.relative
+    if found is None:
+        return Table("In the coordinate system, and relative", columns, ())
+    held = np.isfinite(found.position).all()
+    rows: list[tuple[Any, ...]] = []
+    for what, absolute, left in (
+        ("object points", adjusted.points.total_sigma, found.points),
+        ("projection centres", adjusted.images.total_sigma[:, :3], found.centres),
+    ):
+        place = medians(absolute) if held else np.full(3, np.nan)
+        rows.append((f"{what}, in the coordinate system", *_values(place), "maps, heights above the datum"))
+        rows.append((f"{what}, relative", *_values(medians(left)), "lengths, height differences, volumes"))
+    near = found.neighbours
+    if near is not None:
+        apart = f"height difference of points {near.distance:.3g} m apart"
+        rows.append((apart, None, None, _value(near.sigma), "slopes: with the tilt of the block"))
+        rows.append((f"{apart}, relative", None, None, _value(near.relative), "shape of what lies between"))
+    return Table("In the coordinate system, and relative", columns, tuple(rows))
+
+
+def similarity_in_words(adjusted: AdjustedBlock) -> str:
+    """How well the whole block is placed, turned and scaled; '' where nothing says it."""
+    found = adjusted.relative
+    if found is None or not np.isfinite(found.position).all():
+        return ""
+    x, y, z = (plus_minus(value) for value in found.position)
+    a, b, c = (plus_minus(np.degrees(value), "°") for value in found.rotation)
+    scale = f"{100.0 * found.scale:.2g}"
+    return f"The block as a whole: shift {x}, {y}, {z} (X, Y, Z), rotation {a}, {b}, {c}, scale ± {scale} %."
+
+
+def _values(values: np.ndarray) -> list[float | None]:
+    return [_value(value) for value in values]
+
+
+def _value(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def ellipsoids(adjusted: AdjustedBlock) -> Table:

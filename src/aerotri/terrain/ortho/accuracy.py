@@ -72,7 +72,8 @@ class PlanAccuracy:
     surface : part of the surface, without that of a common adjustment; None: its σ is not known.
     orientation : part of the adjustment, with what it does to the surface where that was measured with it.
     image : the part of a measured image position. total : all of them. tangent : tan ν.
-    same : whether surface and photographs have one adjustment.
+    same : whether surface and photographs have one adjustment. relative : as total, the adjustment after a
+        similarity of the whole orthophoto; None where the surface has another adjustment, which does not move along.
     """
 
     surface: np.ndarray | None
@@ -81,6 +82,7 @@ class PlanAccuracy:
     total: np.ndarray
     tangent: np.ndarray
     same: bool = False
+    relative: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,12 +116,13 @@ def plan_accuracy(
     cells = _cells(photographs, candidates, choice, i, j)
     spread = cells.spread
     image = _image_part(calibration, photographs, cells)
-    variance, of_height, same = _adjustment_part(calibration, photographs, cells, heights.same)
-    orientation, surface = np.sqrt(variance), None
-    noise = _noise(heights, cells.xyz, of_height)
+    by_adjustment = _adjustment_part(calibration, photographs, cells, heights.same)
+    orientation, surface = np.sqrt(by_adjustment.shown), None
+    noise = _noise(heights, cells.xyz, by_adjustment.of_height)
     if noise is not None:
         surface = noise * np.linalg.norm(np.einsum("nab,nb->na", spread, cells.along), axis=1) / np.sqrt(2.0)
-    total = np.sqrt(orientation**2 + image**2 + (0.0 if surface is None else surface**2))
+    others = image**2 + (0.0 if surface is None else surface**2)
+    total, left = np.sqrt(orientation**2 + others), by_adjustment.relative
 
     def laid(values: np.ndarray) -> np.ndarray:
         out = np.full(choice.number.shape, np.nan)
@@ -128,7 +131,8 @@ def plan_accuracy(
 
     return PlanAccuracy(
         None if surface is None else laid(surface), laid(orientation), laid(image), laid(total),
-        laid(np.linalg.norm(cells.along, axis=1)), same,
+        laid(np.linalg.norm(cells.along, axis=1)), by_adjustment.of_height is not None,
+        None if left is None else laid(np.sqrt(left + others)),
     )  # fmt: skip
 
 
@@ -164,10 +168,23 @@ def _image_part(calibration: Adjustment, photographs: Photographs, cells: ShownC
     return sigma[cells.number] * np.sqrt(0.5 * shown)
 
 
-def _adjustment_part(
-    calibration: Adjustment, photographs: Photographs, cells: ShownCells, same: bool
-) -> tuple[np.ndarray, np.ndarray | None, bool]:
-    """(n,) m², mean of X and Y; (n,) m² of the heights where they come from the same adjustment; and whether they do.
+@dataclass(frozen=True, eq=False)
+class ByAdjustment:
+    """What the adjustment does to n cells, variances in m².
+
+    Parameters
+    ----------
+    shown : (n,) mean of X and Y of what they show. of_height : (n,) of Z; None where the surface is not of the same
+        adjustment. relative : (n,) as `shown`, after a similarity of all; None likewise.
+    """
+
+    shown: np.ndarray
+    of_height: np.ndarray | None = None
+    relative: np.ndarray | None = None
+
+
+def _adjustment_part(calibration: Adjustment, photographs: Photographs, cells: ShownCells, same: bool) -> ByAdjustment:
+    """The part of the adjustment, of a surface of the same adjustment or of another.
 
     Where no cell is seen by two photographs from different places, nothing is known of how the surface moves.
     """
@@ -180,9 +197,10 @@ def _adjustment_part(
     spread = cells.spread
     if not same:
         shown = np.einsum("nai,nij,naj->na", spread, plan_covariances(*given)[near], spread, optimize=True)
-        return shown.mean(axis=1), None, False
-    both = shown_covariances(*given, cells.seen_by[some])[near]
-    return shown_variances(cells, both).mean(axis=1), both[:, 5, 5], True
+        return ByAdjustment(shown.mean(axis=1))
+    both, left = (found[near] for found in shown_covariances(*given, cells.seen_by[some]))
+    shown, relative = (shown_variances(cells, found).mean(axis=1) for found in (both, left))
+    return ByAdjustment(shown, both[:, 5, 5], relative)
 
 
 def _seen_with_a_base(photographs: Photographs, cells: ShownCells) -> np.ndarray:
