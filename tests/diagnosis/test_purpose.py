@@ -1,12 +1,13 @@
 """What a result is good for: positions and shape, the shape alone, or neither; with the numbers."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import aerotri
-from aerotri.diagnosis.purpose import plus_minus
+from aerotri.diagnosis.purpose import plus_minus, purpose
 from aerotri.report.pages.adjustment import report_html
 from dense_algebra import TINY
 from small_blocks import small_block, with_adjustment
@@ -77,3 +78,12 @@ def test_large_errors_of_image_points_leave_no_shape():
 
 def test_lengths_in_the_unit_that_suits_them():
     assert [plus_minus(v) for v in (9.22, 0.0312, 0.00042, 121.0)] == ["± 9.2 m", "± 3.1 cm", "± 0.42 mm", "± 120 m"]
+
+
+def test_a_doubtful_result_is_good_for_something_if_its_sigma_hold(of_metres):
+    doubtful = replace(of_metres.record.local, outcome=replace(of_metres.record.local.outcome, verdict="doubtful"))
+    found = purpose(doubtful)
+    assert found.good_for == "relative"
+    assert found.says == f"By its σ, which are in doubt: g{of_metres.purpose[1:]}"
+    rejected = replace(doubtful, outcome=replace(doubtful.outcome, verdict="rejected"))
+    assert purpose(rejected).good_for == "neither"

@@ -7,12 +7,19 @@ import numpy as np
 import pytest
 from rendered_blocks import CAMERA
 
+from aerotri.adjustment.datum import motions_of_points
 from aerotri.deformation.restitution import FREE, restitution_of
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.rasters.grids import Grid
 from aerotri.simulation import parse_spec, simulate
-from aerotri.terrain.adjustment_part import covariances_at, plan_covariances, shown_covariances
+from aerotri.terrain.adjustment_part import (
+    both_covariances_at,
+    covariances_at,
+    plan_covariances,
+    shown_covariances,
+    solved_partials,
+)
 from aerotri.terrain.ortho.accuracy import HeightSigma, ShownCells, plan_accuracy, shown_variances, slopes
 from small_blocks import small_spec
 
@@ -90,6 +97,34 @@ def met(centre, direction, place, slope):
     """(3,) where a ray meets the plane through a place with a slope (2,)."""
     normal = np.append(-slope, 1.0)
     return centre + direction * (normal @ (place - centre)) / (normal @ direction)
+
+
+def test_what_a_similarity_of_all_places_leaves():
+    """The blocks of S·C·Sᵀ, C the joint covariance of the places of a surface written out."""
+    block, made, calibration, restitution = adjusted(3, distance_bases=100.0, sigma_m=[5.0, 5.0, 5.0])
+    rows, points = np.arange(len(block.images)), calibration.local.points.xyz
+    xyz = points[np.flatnonzero(calibration.local.points.rays >= 4)][:30]
+    photographs = np.array([seen_by(made, place)[:3] for place in xyz])
+    absolute, relative = both_covariances_at(calibration, restitution, rows, xyz, photographs)
+    solved = solved_partials(calibration, restitution, rows, xyz, photographs)
+    by_unknowns = solved.reshape(len(solved), -1)
+    joint = calibration.local.outcome.sigma0**2 * (by_unknowns.T @ np.linalg.solve(dense_q(calibration), by_unknowns))
+    each = np.arange(len(xyz))
+    blocks = joint.reshape(len(xyz), 3, len(xyz), 3)[each, :, each]
+    assert blocks == pytest.approx(absolute, rel=1e-5, abs=1e-9)
+    g = motions_of_points(xyz - xyz.mean(axis=0)).reshape(-1, 7)
+    left = np.eye(len(g)) - g @ np.linalg.solve(g.T @ g, g.T)
+    blocks = (left @ joint @ left.T).reshape(len(xyz), 3, len(xyz), 3)[each, :, each]
+    assert blocks == pytest.approx(relative, rel=1e-4, abs=1e-6 * np.abs(relative).max())
+    # metres of control lift and tilt the whole
+    assert np.median(relative[:, 2, 2]) < 0.1 * np.median(absolute[:, 2, 2])
+
+
+def dense_q(calibration):
+    """Q of photographs and shared parameters, column by column."""
+    system = calibration.system
+    factor = system.factorise(calibration.solution.equations)
+    return factor.solve(np.eye(6 * len(system.unknowns.images) + len(system.unknowns.shared)))
 
 
 def test_a_shift_of_the_block_moves_details_as_it_does_the_surface():

@@ -6,7 +6,7 @@ is for maps and for heights above a datum, the second for lengths, slopes of the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,8 +18,12 @@ ABSOLUTE, RELATIVE, NEITHER = "absolute", "relative", "neither"
 PIXELS = 10.0
 """Pixels on the ground that σ may be for a result to be good for something; chosen [C]: a photograph shows details to a
 pixel or two, and control or GNSS with corrections give a block some pixels. GNSS of metres gives it hundreds."""
+IN_DOUBT = "By its σ, which are in doubt: g"
+"""What a sentence on a doubtful result begins with, in place of its first letter."""
 WORTH_SAYING = 5e-4
 """σ of the scale from which it is said; chosen [C]: 5 cm of 100 m, 0.15 % of a volume."""
+NO_BETTER = 0.95
+"""Share of σ of the places from which on the relative one is not said to be better; chosen [C]."""
 PER_VOLUME = 3.0
 """A volume errs by three times the scale."""
 
@@ -53,10 +57,12 @@ def purpose(adjusted: AdjustedBlock) -> Purpose:
     free = not np.isfinite(relative.position).all()
     place = np.full(3, np.nan) if free else medians(adjusted.points.total_sigma)
     if (place <= PIXELS * pixel).all():
-        return Purpose(ABSOLUTE, _absolute(place, relative))
-    if (relative.medians <= PIXELS * pixel).all():
-        return Purpose(RELATIVE, _relative(place, relative))
-    return Purpose(NEITHER, _neither(relative, pixel))
+        found = Purpose(ABSOLUTE, _absolute(place, relative))
+    elif (relative.medians <= PIXELS * pixel).all():
+        found = Purpose(RELATIVE, _relative(place, relative))
+    else:
+        found = Purpose(NEITHER, _neither(relative, pixel))
+    return found if adjusted.outcome.verdict == "accepted" else replace(found, says=f"{IN_DOUBT}{found.says[1:]}")
 
 
 def beside_verdict(verdict: str, good_for: str) -> str:
@@ -75,8 +81,16 @@ def ground_pixel(adjusted: AdjustedBlock) -> float:
 def _absolute(place: np.ndarray, relative: RelativePrecision) -> str:
     return (
         f"Good for positions and heights in the coordinate system: X and Y {plus_minus(_plan(place))}, heights "
-        f"{plus_minus(place[2])} (σ, median of the points). {_of_shape(relative)}"
+        f"{plus_minus(place[2])} (σ, median of the points). {_beside_places(place, relative)}"
     )
+
+
+def _beside_places(place: np.ndarray, relative: RelativePrecision) -> str:
+    """The shape, where it is known better than the places: few points beside control tell a similarity no better."""
+    left = relative.medians
+    if left[2] > NO_BETTER * place[2] and _plan(left) > NO_BETTER * _plan(place):
+        return "Relative to one another they are known no better."
+    return _of_shape(relative)
 
 
 def _relative(place: np.ndarray, relative: RelativePrecision) -> str:

@@ -162,13 +162,19 @@ def _shape_over(
 
 
 def _solved(
-    system: NormalSystem, solution: Solution, factor: Factor, sides: np.ndarray, inner: InnerDatum | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Q times right sides of points (P, 3, k), in the datum of the block: photographs, shared parameters, points."""
-    if inner is not None:
-        sides = sides - inner.conditions @ np.einsum("pid,pik->dk", inner.points, sides)
-    found = solve_sides(system, solution.state, factor, sides, solution.estimator)
-    return found if inner is None else inner.moved(*found)
+    system: NormalSystem, solution: Solution, factor: Factor, sides: np.ndarray, inner: InnerDatum | None,
+    rows: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """Q times right sides of points (P, 3, k), in the datum of the block: photographs, shared parameters, points.
+
+    Parameters
+    ----------
+    rows : the points that have sides or are wanted, where these are few; all unless given.
+    """
+    if inner is None:
+        return solve_sides(system, solution.state, factor, sides, solution.estimator, rows=rows)
+    sides = sides - inner.conditions @ np.einsum("pid,pik->dk", inner.points, sides)
+    return inner.moved(*solve_sides(system, solution.state, factor, sides, solution.estimator))
 
 
 def _motions(unknowns: Unknowns, state: State, middle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -280,7 +286,9 @@ def _of_pairs(
     sides = np.zeros((len(solution.state.points), 3, len(first)))
     sides[first, 2, k] += 1.0
     sides[second, 2, k] -= 1.0
-    _, shared, points = _solved(system, solution, factor, sides, shape.inner)
+    observed = np.flatnonzero((system.unknowns.prior_weight > 0.0).any(axis=1))
+    rows = np.unique(np.concatenate([first, second, observed]))
+    _, shared, points = _solved(system, solution, factor, sides, shape.inner, rows)
     own = points[first, 2, k] - points[second, 2, k]
     g, qa = (part[first, 2] - part[second, 2] for part in (d.points, d.q_points))
     left = own - 2.0 * np.sum(g * qa, axis=1) + np.einsum("ka,ab,kb->k", g, d.both, g)

@@ -146,15 +146,20 @@ def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
     for on, volume in measured:
         found += _volume(volume, on if len(measured) > 1 else "")
     if surface := of_step.get("dsm"):
-        sigma = surface["sigma_Z_m"]["median"]
-        found.append(
-            ("Dense surface", f"cells of {surface['cell_m']:.3g} m; σ of heights {two_digits(sigma)} m (median)")
-        )
+        sigma = surface["sigma_Z_m"]
+        text = f"cells of {surface['cell_m']:.3g} m; σ of heights {two_digits(sigma['median'])} m (median)"
+        found.append(("Dense surface", text + _left(sigma.get("relative"))))
     if image := of_step.get("ortho"):
         total = image["sigma_m"]["total"]
         text = f"cells of {image['cell_m']:g} m; σ of positions {two_digits(total['median'])} m (median), 95 % below "
-        found.append(("Orthophoto", f"{text}{two_digits(total['q95'])} m"))
+        left = (image["sigma_m"].get("relative") or {}).get("median")
+        found.append(("Orthophoto", f"{text}{two_digits(total['q95'])} m{_left(left)}"))
     return found
+
+
+def _left(sigma: float | None) -> str:
+    """The σ of the shape behind that in the coordinate system; '' where it is not known."""
+    return "" if sigma is None else f"; relative, for shape and volumes, {two_digits(sigma)} m"
 
 
 def _volume(volume: Mapping[str, Any], on: str) -> list[tuple[str, str]]:
