@@ -138,9 +138,9 @@ def _orient_along_track(
     if best is None:
         return known.copy()
     height = float(np.nanmedian(observed[:, 2]) - np.nanmedian(best[2][:, 2]))
-    centres = _loose_centres(block, observed + origin, LOOSE_CENTRE * max(abs(height), 1.0))
+    centres = loose_centres(block, observed + origin, LOOSE_CENTRE * max(abs(height), 1.0))
     # far from the solution a free camera may run away: where it has, it is held
-    for tried, iterations in ((block, TRACK_ITERATIONS), (_with_held_cameras(block), HELD_TRACK_ITERATIONS)):
+    for tried, iterations in ((block, TRACK_ITERATIONS), (with_held_cameras(block), HELD_TRACK_ITERATIONS)):
         rotation[:], points = best[1], best[2].copy()
         centre[there] = observed[there]
         refine(tried, origin, rotation, centre, points, iterations, centres)
@@ -151,7 +151,7 @@ def _orient_along_track(
     return known.copy()
 
 
-def _with_held_cameras(block: Block) -> Block:
+def with_held_cameras(block: Block) -> Block:
     """The block with the interior orientation of its cameras held at what was stated."""
     held = [{k: Prior(p.value, fixed=True) for k, p in camera.interior.items()} for camera in block.cameras]
     return replace(block, cameras=tuple(replace(c, interior=h) for c, h in zip(block.cameras, held, strict=True)))
@@ -193,14 +193,14 @@ def _miss_by_strip(
     strip = of_image[rays.image[use]]
     pair, point = np.unique(rays.point[use] * strips + strip, return_inverse=True)
     image, tangent = rays.image[use], directions.tangent[use]
-    _, miss = _meet(len(pair), point, rotation[image], centre[image], tangent, directions.tolerance[use])
+    _, miss = rays_meet(len(pair), point, rotation[image], centre[image], tangent, directions.tolerance[use])
     # a point in one photograph of the strip says nothing
     tells = np.bincount(point, minlength=len(pair))[point] > 1
     own = [miss[tells & (strip == k)] for k in range(strips)]
     return np.array([np.median(of_strip) if len(of_strip) else 0.0 for of_strip in own])
 
 
-def _meet(
+def rays_meet(
     count: int, point: np.ndarray, rotation: np.ndarray, centre: np.ndarray, tangent: np.ndarray, tolerance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points (count, 3) where rays meet, and the angular distance (m,) rad of each ray, π where there is no point."""
@@ -213,7 +213,7 @@ def _meet(
     return found, np.where(np.isfinite(along), np.arccos(np.clip(along, -1.0, 1.0)), np.pi)
 
 
-def _loose_centres(block: Block, observed: np.ndarray, sigma_m: float) -> GnssIns:
+def loose_centres(block: Block, observed: np.ndarray, sigma_m: float) -> GnssIns:
     """The centres as observations that hold the block without forcing it; `observed` (n, 3) m."""
     rows = np.flatnonzero(np.isfinite(observed[:, 0]))
     nothing = np.full((len(rows), 3), np.nan)
@@ -282,7 +282,7 @@ def intersect_into(
     rays = block.image_points
     use = np.isfinite(centre[rays.image, 0])
     image, point = rays.image[use], rays.point[use]
-    found, miss = _meet(
+    found, miss = rays_meet(
         len(points), point, rotation[image], centre[image], directions.tangent[use], directions.tolerance[use]
     )
     there = np.isfinite(found).all(axis=1)

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from aerotri.diagnosis import changes
+from aerotri.diagnosis.angle_conventions import conventions
 from aerotri.diagnosis.free_model import FreeModel
 from aerotri.diagnosis.hypothesis import Hypothesis
-from aerotri.functional_model.rotation import OMEGA_PHI_KAPPA, angles_from_rotation, rotation_from_angles
 from aerotri.observations import Block
 
 Place = tuple[np.ndarray, np.ndarray]
@@ -28,12 +28,6 @@ SUBJECTS: dict[tuple[str, ...], str] = {
 POSITIONS = {"control", "check", "gnss", "start"}
 UNITS = ((1e-3, "millimetres"), (1e-2, "centimetres"), (0.3048, "feet"))
 """Metres of one unit that coordinates may have been given in; the international foot is 0.3048 m exactly [L]."""
-ANGLE_UNITS = (
-    (0.9, "gon in place of degrees"), (1.0 / 0.9, "degrees in place of gon"),
-    (180.0 / np.pi, "radians in place of degrees"), (np.pi / 180.0, "degrees in place of radians"),
-    (200.0 / np.pi, "radians in place of gon"), (np.pi / 200.0, "gon in place of radians"),
-)  # fmt: skip
-"""Factors that undo a mistaken unit of angles: 360° = 400 gon = 2π."""
 
 
 def sets_there(block: Block) -> set[str]:
@@ -171,32 +165,9 @@ def _within(moved: changes.Positions, rows: np.ndarray) -> changes.Positions:
 
 
 def of_angles(block: Block) -> Iterator[Hypothesis]:
-    """Units, order and sense of the angles."""
+    """Units, order, sense and axes of the angles."""
     there = sets_there(block)
     for sets in (("ins", "start angles"), ("ins",), ("start angles",)):
-        if not set(sets) <= there:
-            continue
-
-        def made(change: changes.Positions, remedy: str, sets: tuple[str, ...] = sets) -> Hypothesis:
-            return Hypothesis(SUBJECTS[sets], remedy, changes.on_angles(sets, change))
-
-        yield made(changes.turned_about(np.pi), "180° added to kappa")
-        yield made(changes.turned_about(np.pi / 2.0), "90° added to kappa")
-        yield made(changes.turned_about(-np.pi / 2.0), "90° taken from kappa")
-        for factor, unit in ANGLE_UNITS:
-            yield made(changes.scaled(factor), f"{unit} taken for what they are")
-        yield made(_other_order(block.rotation), _order_in_words(block.rotation))
-        yield made(changes.exchanged_angles, "omega and phi exchanged")
-        for axis, name in enumerate(("omega", "phi", "kappa")):
-            yield made(changes.negated(axis), f"{name} negated")
-        yield made(changes.scaled(-1.0), "all angles negated")
-
-
-def _order_in_words(order: str) -> str:
-    return "the order phi-omega-kappa" if order == OMEGA_PHI_KAPPA else "the order omega-phi-kappa"
-
-
-def _other_order(order: str) -> changes.Positions:
-    """Angles of the other order as those of the block's."""
-    other = "phi-omega-kappa" if order == OMEGA_PHI_KAPPA else OMEGA_PHI_KAPPA
-    return lambda angles: angles_from_rotation(rotation_from_angles(angles, other), order)
+        if set(sets) <= there:
+            for convention in conventions(block.rotation):
+                yield Hypothesis(SUBJECTS[sets], convention.remedy, changes.on_angles(sets, convention.change))

@@ -19,7 +19,7 @@ from aerotri.pipeline.local import Report
 from aerotri.pipeline.model_part import with_model_part
 from aerotri.pipeline.relative import with_relative
 from aerotri.pipeline.shutter_test import with_shutter_test
-from aerotri.pipeline.starting import with_start
+from aerotri.pipeline.starting import Started, with_start
 from aerotri.pipeline.verdict import causes, judged, with_outcome
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.adjustment import Adjustment
@@ -71,6 +71,18 @@ def adjust_keeping_system(
     sets : called before each set of additional parameters that is tried, where they are to be chosen.
     """
     started = with_start(with_named_strips(block), geoid)
+    return _from_start(started, report, given_points, geoid, tested, sets)
+
+
+def _from_start(
+    started: Started,
+    report: Report | None,
+    given_points: np.ndarray | None,
+    geoid: FilePath | None,
+    tested: bool,
+    sets: Progress | None,
+) -> Adjustment:
+    """As `adjust_keeping_system`, of a block with start values."""
     choice, block = None, started.block
     if block.settings.adjustment.additional_parameters == AUTO:
         choice = choose_parameters(block, geoid, sets)
@@ -128,9 +140,7 @@ def adjust_and_explain(
         return causes(_as_chosen(given, found), found, again, geoid)
 
     try:
-        started = with_start(given, geoid, say)
-        block = started.block
-        found = started.told(adjust_keeping_system(block, report, geoid=geoid, sets=sets))
+        found = _from_start(with_start(given, geoid, say), report, None, geoid, True, sets)
     except AdjustmentFailedError as error:
         o = error.outcome
         raise AdjustmentFailedError(replace(o, reasons=(*explained(None), *o.reasons))) from error

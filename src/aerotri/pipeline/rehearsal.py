@@ -41,7 +41,8 @@ def rehearse(block: Block, geoid: FilePath | None = None) -> Rehearsal:
     if not len(block.image_points):
         return Rehearsal(_nothing_there(block))
     try:
-        block = with_start(block, geoid).block
+        started = with_start(block, geoid)
+        block = started.block
         local = block if block.crs == "local" else transform_block(block, frame_of_block(block, geoid))
         prepared = prepare(local)
     except InputError as error:
@@ -55,7 +56,7 @@ def rehearse(block: Block, geoid: FilePath | None = None) -> Rehearsal:
         prepared, SolveOptions(1, "off", None), lambda one: count_observations(one).redundancy, whole=False
     )
     missing = (defects_in_words(looked.system, solution.defects),) if solution.defects else ()
-    return Rehearsal(missing, looked.warnings)
+    return Rehearsal(missing, (*started.messages, *looked.warnings))
 
 
 def _nothing_there(block: Block) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.adjustment.doubtful_starts import Orientations
 from aerotri.adjustment.prepare import NoStartValuesError
 from aerotri.adjustment.rig_start import rig_start_values, without_followers
 from aerotri.conventions import FilePath, InputError, counted
@@ -15,6 +16,7 @@ from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.observations import Block
 from aerotri.observations.rigs import station_places
+from aerotri.pipeline.given_starts import checked_start
 from aerotri.pipeline.verdict import with_outcome
 from aerotri.results.adjustment import Adjustment
 from aerotri.tie_points.measured_start import MeasuredStart, misses, start_from_points
@@ -39,19 +41,11 @@ class Started:
         return with_outcome(found, replace(outcome, warnings=(*self.messages, *outcome.warnings)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Orientations:
-    """(n, 3) m and (n, 3, 3) in the local frame."""
-
-    centre: np.ndarray
-    rotation: np.ndarray
-
-
 def with_start(block: Block, geoid: FilePath | None = None, say: Callable[[str], None] = lambda text: None) -> Started:
     """The block with start values, as its setting `start` says.
 
-    A block with an orientation that is given stays as it is, unless the tie points alone are asked for; one that has
-    been started says start = "auto", so that it is not started again.
+    A block with an orientation that is given stays as it is, unless the tie points alone are asked for, or contradict
+    it (`given_starts`); one that has been started says start = "auto", so that it is not started again.
 
     Parameters
     ----------
@@ -65,15 +59,46 @@ def with_start(block: Block, geoid: FilePath | None = None, say: Callable[[str],
     """
     wanted = block.settings.adjustment.start
     given = np.isfinite(block.images.centre).all(axis=1) & np.isfinite(block.images.angles).all(axis=1)
-    if wanted == STRIPS or not len(block.image_points) or (wanted != POINTS and given.any()):
+    if wanted == STRIPS or not len(block.image_points):
         return Started(block)
     frame = None if block.crs == "local" else frame_of_block(block, geoid)
     local = block if frame is None else transform_block(block, frame)
-    if wanted == POINTS:
+    if wanted != POINTS and given.any():
+        return _given_as_far_as_right(block, local, frame, say)
+    return _from_measurements(block, local, frame, say)
+
+
+def _given_as_far_as_right(block: Block, local: Block, frame: LocalFrame | None, say: Callable[[str], None]) -> Started:
+    """The block with its given orientations; those that the tie points contradict are replaced by theirs."""
+
+    def begin(bare: Block) -> tuple[Block, tuple[str, ...]]:
+        started = _from_measurements(bare, bare, None, say)
+        return started.block, started.messages
+
+    checked = checked_start(local, begin)
+    if checked is None:
+        return Started(block)
+    new = checked.replacement.new
+    if not new.any():
+        return Started(block, checked.messages)
+    made = _oriented(block, checked.replacement.orientations.only(new), frame)
+    rows, own = new[:, None], block.images
+    images = replace(
+        own,
+        centre=np.where(rows, made.images.centre, own.centre),
+        angles=np.where(rows, made.images.angles, own.angles),
+    )
+    cameras = block.cameras if checked.begun is None else checked.begun.cameras
+    return Started(replace(block, images=images, cameras=cameras), checked.messages)
+
+
+def _from_measurements(block: Block, local: Block, frame: LocalFrame | None, say: Callable[[str], None]) -> Started:
+    """The block started without any orientation that is given."""
+    if block.settings.adjustment.start == POINTS:
         say(ORIENTING)
         return _from_points(block, local, frame)
     strips = rig_start_values(local)
-    quick = _Orientations(strips.centre + strips.origin, strips.rotation)
+    quick = Orientations(strips.centre + strips.origin, strips.rotation)
     oriented = np.isfinite(quick.centre[:, 0])
     tied = np.bincount(local.image_points.image, minlength=len(oriented)) > 0
     if oriented.sum() >= MOST * tied.sum() and _median_miss(local, quick) <= HOLDS:
@@ -89,7 +114,7 @@ def with_start(block: Block, geoid: FilePath | None = None, say: Callable[[str],
     return found if better else Started(_oriented(block, quick, frame))
 
 
-def _median_miss(local: Block, start: _Orientations) -> float:
+def _median_miss(local: Block, start: Orientations) -> float:
     miss = misses(local, start.centre, start.rotation)
     known = miss[~np.isnan(miss)]
     return float(np.median(known)) if len(known) else np.inf
@@ -104,7 +129,7 @@ def _from_points(block: Block, local: Block, frame: LocalFrame | None) -> Starte
             f"{error.remedy}; or give X0, Y0, Z0, omega, phi, kappa of some photographs in images.csv",
             file="images.csv",
         ) from error
-    started = _oriented(block, _Orientations(found.centre, found.rotation), frame)
+    started = _oriented(block, Orientations(found.centre, found.rotation), frame)
     adjustment = replace(started.settings.adjustment, start="auto")
     settings = replace(started.settings, adjustment=adjustment)
     return Started(replace(started, cameras=found.cameras, settings=settings), found.messages)
@@ -129,7 +154,7 @@ def _of_reference_photographs(local: Block) -> MeasuredStart | None:
     return replace(found, messages=(*found.messages, told))
 
 
-def _oriented(block: Block, start: _Orientations, frame: LocalFrame | None) -> Block:
+def _oriented(block: Block, start: Orientations, frame: LocalFrame | None) -> Block:
     """The block with orientations in its CRS; photographs that have none keep the position that is stated."""
     known = np.isfinite(start.centre).all(axis=1)
     found, rotation = start.centre[known], start.rotation[known]

@@ -1,0 +1,113 @@
+"""Start angles that the tie points contradict are replaced by theirs, and said; right ones never are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import aerotri
+from aerotri.functional_model.rotation import (
+    angles_from_rotation,
+    exponential,
+    logarithm,
+    rotation_from_angles,
+)
+from aerotri.observations import Block
+from aerotri.pipeline.starting import with_start
+from aerotri.simulation import parse_spec, simulate
+from rig_blocks import rig_block
+from small_blocks import small_block
+from wrong_blocks import DRONE, SPEC, clean, image_points, negated, photograph
+
+ROUGH = {"start_values": {"kind": "perturbed", "position_sigma_m": 2.0, "angle_sigma_deg": 3.0}}
+ANGLES_DEG = (30.0, 60.0, 90.0, 120.0, 150.0, 180.0)
+
+
+def drone() -> Block:
+    """Four strips of a drone whose start values err by 2 m at 100 m and by 3°."""
+    return simulate(parse_spec(SPEC | DRONE | ROUGH), 3)[0]
+
+
+def few() -> Block:
+    """Three photographs of one strip."""
+    flight = {**SPEC["flight"], "strips": 1, "images_per_strip": 3}
+    return simulate(parse_spec(SPEC | {"flight": flight, "control": {**SPEC["control"], "distance_bases": 1.0}}), 3)[0]
+
+
+BLOCKS = {
+    "large format": lambda: small_block(1)[0],
+    "two strips": lambda: clean("control"),
+    "two strips in UTM": lambda: clean("crs"),
+    "drone": drone,
+    "few": few,
+    "rig": lambda: rig_block(3)[0],
+}
+
+
+def turned(block: Block, rows: np.ndarray, axis: np.ndarray, degrees: float) -> Block:
+    """Start angles of some photographs turned about an axis of the camera."""
+    angles = block.images.angles.copy()
+    turn = exponential(np.radians(degrees) * axis / np.linalg.norm(axis))
+    angles[rows] = angles_from_rotation(rotation_from_angles(angles[rows], block.rotation) @ turn, block.rotation)
+    return replace(block, images=replace(block.images, angles=angles))
+
+
+def degrees_apart(block: Block, other: Block) -> np.ndarray:
+    """(n,) between the start angles of two blocks."""
+    first, second = (rotation_from_angles(b.images.angles, b.rotation) for b in (block, other))
+    return np.degrees(np.linalg.norm(logarithm(np.swapaxes(first, 1, 2) @ second), axis=1))
+
+
+@pytest.mark.parametrize("shape", BLOCKS)
+def test_right_start_values_stay_as_they_are(shape):
+    block = BLOCKS[shape]()
+    started = with_start(block)
+    assert started.messages == ()
+    assert started.block is block
+
+
+@pytest.mark.parametrize("shape", BLOCKS)
+def test_start_of_one_photograph_is_replaced_whatever_the_angle_and_the_axis(shape):
+    block, random = BLOCKS[shape](), np.random.default_rng(7)
+    measured = np.unique(block.image_points.image)
+    for degrees in ANGLES_DEG:
+        number, axis = int(random.choice(measured)), random.normal(size=3)
+        started = with_start(turned(block, np.array([number]), axis, degrees))
+        assert degrees_apart(block, started.block).max() < 15.0, (degrees, axis, number, started.messages)
+        assert len(started.messages) == 1
+        assert f"start angles of photograph {photograph(block, number)} were not used" in started.messages[0]
+
+
+TURNS = {
+    "180° added to kappa": (np.array([0.0, 0.0, 1.0]), 180.0),
+    "90° taken from kappa": (np.array([0.0, 0.0, 1.0]), 90.0),
+    "y of the camera taken as pointing down": (np.array([1.0, 0.0, 0.0]), 180.0),
+}
+
+
+@pytest.mark.parametrize("remedy", TURNS)
+@pytest.mark.parametrize("shape", ["large format", "two strips in UTM", "drone"])
+def test_start_of_a_strip_or_of_all_is_replaced_and_the_convention_said(shape, remedy):
+    block, (axis, degrees) = BLOCKS[shape](), TURNS[remedy]
+    strip = np.asarray(block.images.strip)
+    for rows, words in ((np.flatnonzero(strip == strip[0]), f"strip {strip[0]}"), (np.arange(len(strip)), "all")):
+        started = with_start(turned(block, rows, axis, degrees))
+        assert degrees_apart(block, started.block).max() < 15.0
+        assert f"start angles of {words}" in started.messages[0]
+        assert remedy in started.messages[0]
+
+
+def test_adjustment_is_that_of_right_start_values_and_says_what_was_wrong():
+    block = clean("control")
+    right = aerotri.adjust(block)
+    wrong = aerotri.adjust(turned(block, np.array([3]), np.array([0.0, 1.0, 0.0]), 120.0))
+    assert wrong.verdict == right.verdict == "accepted"
+    assert wrong.sigma0 == pytest.approx(right.sigma0, rel=1e-6)
+    assert any("they are 120° off" in said for said in wrong.adjusted.outcome.warnings)
+
+
+def test_measurements_that_are_wrong_are_not_taken_for_start_angles():
+    block = image_points(negated(0), 3)(clean("control"))
+    assert not any("were not used" in said for said in with_start(block).messages)
