@@ -129,6 +129,23 @@ def image_points(change: Callable[[np.ndarray], np.ndarray], number: int | None 
     return spoil
 
 
+def of_strip(block: Block, name: str) -> np.ndarray:
+    """Indices of the photographs of a strip."""
+    return np.flatnonzero(np.asarray(block.images.strip) == name)
+
+
+def strip_points(change: Callable[[np.ndarray], np.ndarray], name: str) -> Spoil:
+    """Measurements (k, 2) of the photographs of a strip changed."""
+
+    def spoil(block: Block) -> Block:
+        rays = block.image_points
+        own, xy = np.isin(rays.image, of_strip(block, name)), rays.xy.copy()
+        xy[own] = change(xy[own])
+        return replace(block, image_points=replace(rays, xy=xy))
+
+    return spoil
+
+
 def ground(change: Callable[[np.ndarray], np.ndarray], only: str = "") -> Spoil:
     """Coordinates (k, 3) of control and check points changed, or of 'control' only."""
 
@@ -176,6 +193,27 @@ def both(*spoils: Spoil) -> Spoil:
         return block
 
     return spoil
+
+
+def of_rows(rows: np.ndarray, change: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+    """Some rows changed."""
+
+    def spoil(values: np.ndarray) -> np.ndarray:
+        values = values.copy()
+        values[rows] = change(values[rows])
+        return values
+
+    return spoil
+
+
+def camera_turned(block: Block) -> Callable[[np.ndarray], np.ndarray]:
+    """Angles (k, 3) of a camera frame with y down and z forward."""
+
+    def change(angles: np.ndarray) -> np.ndarray:
+        rotation = rotation_from_angles(angles, block.rotation) @ np.diag([1.0, -1.0, -1.0])
+        return angles_from_rotation(rotation, block.rotation)
+
+    return change
 
 
 def focal_length(factor: float) -> Spoil:
@@ -350,6 +388,7 @@ def in_other_order(block: Block) -> Callable[[np.ndarray], np.ndarray]:
 
 
 KAPPA_180 = plus(0.0, 0.0, np.pi)
+PHI_120 = plus(0.0, 2.0 * np.pi / 3.0, 0.0)
 EITHER = ("rejected", "doubtful")
 NO_RESULT = ("rejected", "refused")
 """'refused' where nothing can be begun with: the command ends with 2."""
@@ -370,6 +409,14 @@ def _of_measurements() -> list[Kind]:
             Kind("x of one photograph negated", geometry, image_points(negated(0), 3), (name, "x negated")),
             Kind("x of all photographs negated", geometry, image_points(negated(0)), ("x negated",), NO_RESULT),
         ]
+    for geometry in ("navigation", "control", "crs"):
+        found += [
+            Kind("x of one strip negated", geometry, strip_points(negated(0), "1"), ("strip 1", "x negated")),
+            Kind("y of one strip negated", geometry, strip_points(negated(1), "2"), ("strip 2", "y negated")),
+        ]
+    found.append(
+        Kind("x of one strip negated", "track", strip_points(negated(0), "2"), ("strip 2", "x negated"), NO_RESULT)
+    )
     for geometry in ("navigation", "control"):
         name = photograph(clean(geometry), 3)
         other = photograph(clean(geometry), 6)
@@ -480,6 +527,11 @@ def _of_navigation() -> list[Kind]:
         Kind("INS: radians given as degrees", "navigation", ins(times(np.pi / 180.0)), ("radians",)),
         Kind("INS: kappa + 180°", "navigation", ins(KAPPA_180), ("180° added to kappa",)),
         Kind("INS: omega and phi exchanged", "navigation", ins(exchanged), ("omega and phi exchanged",)),
+        Kind("INS: y of the camera pointing down", "navigation", ins(camera_turned(n)), ("y of the camera",)),
+        Kind("INS: kappa of four photographs + 180°", "navigation", ins(of_rows(np.arange(1, 5), KAPPA_180)),
+             ("180° added to kappa",)),
+        Kind("INS: phi of one photograph + 120°", "navigation", ins(row(4, PHI_120)), (photograph(n, 4), "left out"),
+             EITHER),
         Kind("INS in the order phi-omega-kappa", "navigation", ins(in_other_order(n)), ("phi-omega-kappa",), EITHER),
     ]  # fmt: skip
     return found
@@ -493,6 +545,13 @@ def _of_start_values() -> list[Kind]:
         Kind("kappa of the start values + 180°", "navigation", start_angles(KAPPA_180), turned,
              HARMLESS),
         Kind("kappa of one start value + 180°", "control", start_angles(one), (photograph(c, 4), "kappa"), HARMLESS),
+        Kind("phi of one start value + 120°", "control", start_angles(row(4, PHI_120)), (photograph(c, 4),), HARMLESS),
+        Kind("phi of one start value + 120°", "crs", start_angles(row(4, PHI_120)), (photograph(c, 4),), HARMLESS),
+        Kind("kappa of one strip's start values + 180°", "control",
+             start_angles(of_rows(of_strip(c, "1"), KAPPA_180)), turned, HARMLESS),
+        Kind("start angles: y of the camera pointing down", "control", start_angles(camera_turned(c)),
+             ("y of the camera",), HARMLESS),
+        Kind("start angles: omega + 180°", "control", start_angles(plus(np.pi, 0.0, 0.0)), ("omega",), HARMLESS),
         Kind("start angles: gon given as degrees", "control", start_angles(times(1.0 / 0.9)), ("gon",), HARMLESS),
         Kind("start angles: radians given as degrees", "control", start_angles(times(np.pi / 180.0)), ("radians",),
              HARMLESS),

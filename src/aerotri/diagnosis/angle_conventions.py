@@ -79,21 +79,21 @@ def of_axes(order: str) -> Iterator[Convention]:
     )
 
 
-def convention_between(given: np.ndarray, found: np.ndarray, order: str) -> str:
-    """The remedy with which most of the given angles agree with those found; '' where there is none.
+def convention_between(given: np.ndarray, found: np.ndarray, order: str) -> Convention | None:
+    """The convention that brings most of the given angles to those found; None where there is none.
 
     Parameters
     ----------
     given, found : (k, 3) rad.
     """
     wanted = rotation_from_angles(found, order)
-    best, share = "", MOST
+    best, share = None, MOST
     for convention in conventions(order):
         rotation = rotation_from_angles(convention.change(given), order)
         apart = np.linalg.norm(logarithm(np.swapaxes(rotation, 1, 2) @ wanted), axis=1)
         alike = float(np.mean(apart < ALIKE))
-        if alike > share or (not best and alike >= share):
-            best, share = convention.remedy, alike
+        if alike > share or (best is None and alike >= share):
+            best, share = convention, alike
     return best
 
 

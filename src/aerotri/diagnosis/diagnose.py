@@ -20,6 +20,7 @@ from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.diagnosis import catalogue, focal_length, residual_patterns
 from aerotri.diagnosis.evidence import Evidence, Fit, fit, gather, places_by_others
 from aerotri.diagnosis.free_model import FreeModel, connected_parts, free_model
+from aerotri.diagnosis.groups import of_groups
 from aerotri.diagnosis.hypothesis import Hypothesis
 from aerotri.diagnosis.photographs import try_photographs, unjoined
 from aerotri.diagnosis.sampling import sampled
@@ -48,7 +49,8 @@ CHEAPER = 0.25
 AS_GOOD = 0.15
 """Difference of cost up to which two hypotheses explain the same."""
 PARTIAL = 0.3
-"""Cost of leaving positions out: what brings them to fit is preferred."""
+"""Cost of leaving positions out: what brings them to fit is preferred. And the cost over the least up to which a group
+of photographs is tried."""
 SECONDS = 60.0
 """Time after which nothing new is tried. Some seconds are usual; on no machine should the clock choose what is said."""
 
@@ -119,7 +121,7 @@ def diagnose(
         return ()
     given = tuple(camera.focal_length_mm for camera in block.cameras)
     search = _Search(model, adjust, before, frame, until, given)
-    return _of_photographs(block, search) or _of_the_block(block, search)
+    return _of_groups(block, search) or _of_photographs(block, search) or _of_the_block(block, search)
 
 
 def _without_choices(block: Block) -> Block:
@@ -173,6 +175,21 @@ def _parts_in_words(block: Block) -> tuple[str, ...]:
         f"the photographs fall into {len(parts)} parts without a common point: {'; '.join(said)}{rest}: check the "
         "names of the points",
     )
+
+
+def _of_groups(block: Block, search: _Search) -> tuple[str, ...]:
+    """Strips or cameras whose measurements fit the others with an axis turned round."""
+    candidates = []
+    for hypothesis in of_groups(block, search.model):
+        changed = hypothesis.change(block)
+        local, model = search.local(changed), free_model(changed)
+        if search.is_over or local is None or model is None or model.joined.mean() < NEARLY_ALL:
+            continue
+        found = fit(gather(local, model))
+        candidates.append(_Candidate(hypothesis, found.cost, _with_start(changed, model, found)))
+    least = min((candidate.cost for candidate in candidates), default=0.0)
+    likely = [candidate for candidate in candidates if candidate.cost <= least + PARTIAL]
+    return _proven(sorted(likely, key=lambda candidate: candidate.cost), search)
 
 
 def _of_photographs(block: Block, search: _Search) -> tuple[str, ...]:
@@ -262,7 +279,7 @@ def _hypotheses(block: Block, local: Block | None, model: FreeModel, now: Fit | 
         evidence = gather(local, model)
         places = places_by_others(evidence)
         yield from residual_patterns.of_single_positions(block, evidence, now)
-        yield from residual_patterns.of_single_attitudes(evidence, now)
+        yield from residual_patterns.of_single_attitudes(block, evidence, now)
         yield from residual_patterns.of_offsets(evidence)
     if local is not None:
 

@@ -265,11 +265,18 @@ def _doublings(size: np.ndarray, tolerance: float) -> float:
 
 def _turned(own: Attitudes, placed: Similarity) -> np.ndarray:
     """(k,) rad between given attitudes and those of the placed model, a constant boresight taken off."""
-    apart = np.swapaxes(placed.rotation @ own.model, 1, 2) @ own.given
-    if own.with_boresight:
-        middle = apart[int(np.argmin(np.linalg.norm(logarithm(apart[0].T @ apart), axis=1)))]
-        for _ in range(5):
-            step = np.median(logarithm(np.swapaxes(middle[None], 1, 2) @ apart), axis=0)
-            middle = middle @ exponential(step)
-        apart = middle.T @ apart
+    apart = np.swapaxes(expected_attitudes(own, placed), 1, 2) @ own.given
     return np.linalg.norm(logarithm(apart), axis=1)
+
+
+def expected_attitudes(own: Attitudes, placed: Similarity) -> np.ndarray:
+    """(k, 3, 3) what the placed model says of given attitudes, a constant boresight added where there may be one."""
+    expected = placed.rotation @ own.model
+    if not own.with_boresight:
+        return expected
+    apart = np.swapaxes(expected, 1, 2) @ own.given
+    middle = apart[int(np.argmin(np.linalg.norm(logarithm(apart[0].T @ apart), axis=1)))]
+    for _ in range(5):
+        step = np.median(logarithm(np.swapaxes(middle[None], 1, 2) @ apart), axis=0)
+        middle = middle @ exponential(step)
+    return expected @ middle

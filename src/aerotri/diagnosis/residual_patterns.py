@@ -9,10 +9,13 @@ import numpy as np
 
 from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.diagnosis import changes
+from aerotri.diagnosis.angle_conventions import convention_between
 from aerotri.diagnosis.catalogue import SUBJECTS
-from aerotri.diagnosis.evidence import Evidence, Fit, Positions, fit, sizes
+from aerotri.diagnosis.evidence import Evidence, Fit, Positions, expected_attitudes, fit, sizes
 from aerotri.diagnosis.free_model import FreeModel
+from aerotri.diagnosis.group_names import photographs_in_words
 from aerotri.diagnosis.hypothesis import Hypothesis
+from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.observations import Block
 
 FEW = 4
@@ -21,8 +24,8 @@ OFF = 2.0
 """Misfit in tolerances from which a position is off."""
 SAME_PLACE = 1e-3
 """m within which two positions are the same [C]: the last digit of most files; a copied line differs by nothing."""
-HALF_ROUND = np.pi / 2.0
-"""Turn of an attitude, rad, from which it is nearer to the opposite direction than to the given one: 90°."""
+FAR_TURNED = np.pi / 4.0
+"""Turn of an attitude, rad, from which it is of another kind than the others: half of the least mistake, 90°."""
 
 
 def off_positions(own: Positions, found: Fit) -> np.ndarray:
@@ -43,14 +46,39 @@ def of_single_positions(block: Block, evidence: Evidence, found: Fit) -> Iterato
             yield _taken_out(own, off, found.residual[own.name][off])
 
 
-def of_single_attitudes(evidence: Evidence, found: Fit) -> Iterator[Hypothesis]:
-    """Photographs whose kappa is given the other way round."""
+def of_single_attitudes(block: Block, evidence: Evidence, found: Fit) -> Iterator[Hypothesis]:
+    """Photographs, or strips, whose angles follow another convention than the others; else the angles left out."""
     for own in evidence.attitudes:
-        off = np.flatnonzero(found.turned[own.name] > HALF_ROUND)
-        if 0 < len(off) <= FEW and len(off) < 0.5 * len(own.row):
-            names = ", ".join(own.labels[off].tolist())
-            change = changes.on_angles((own.name,), changes.turned_about(np.pi, own.row[off]))
-            yield Hypothesis(f"{SUBJECTS[(own.name,)]} ({names})", "180° added to kappa", change)
+        off = np.flatnonzero(found.turned[own.name] > FAR_TURNED)
+        if found.placed is None or not 0 < len(off) < 0.5 * len(own.row):
+            continue
+        gnss, rows = block.gnss_ins, own.row[off]
+        is_ins = own.name == "ins" and gnss is not None
+        image, angles = (gnss.image[rows], gnss.angles) if is_ins else (rows, block.images.angles)
+        subject = f"{SUBJECTS[(own.name,)]} of {photographs_in_words(block, image)}"
+        expected = angles_from_rotation(expected_attitudes(own, found.placed)[off], block.rotation)
+        convention = convention_between(angles[rows], expected, block.rotation)
+        if convention is not None:
+            change = _on_rows(convention.change, rows)
+            yield Hypothesis(subject, convention.remedy, changes.on_angles((own.name,), change))
+        elif len(off) <= FEW:
+            turned = np.degrees(np.median(found.turned[own.name][off]))
+            nothing = changes.with_rows(rows, np.full((len(rows), 3), np.nan))
+            yield Hypothesis(
+                "block", f"the {subject} left out", changes.on_angles((own.name,), nothing), plural=False,
+                note=f"they are turned by {turned:.0f}°",
+            )  # fmt: skip
+
+
+def _on_rows(change: changes.Positions, rows: np.ndarray) -> changes.Positions:
+    """A change of some rows."""
+
+    def changed(values: np.ndarray) -> np.ndarray:
+        found = values.copy()
+        found[rows] = change(values[rows])
+        return found
+
+    return changed
 
 
 def _noun(own: Positions) -> str:

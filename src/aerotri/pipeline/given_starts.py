@@ -20,7 +20,7 @@ from aerotri.adjustment.doubtful_starts import (
     oriented_anew,
 )
 from aerotri.adjustment.prepare import NoStartValuesError
-from aerotri.diagnosis.angle_conventions import convention_between
+from aerotri.diagnosis.angle_conventions import Convention, convention_between
 from aerotri.diagnosis.group_names import photographs_in_words
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.observations import Block
@@ -94,9 +94,9 @@ def _is_plausible(local: Block, given: Orientations, found: Orientations) -> boo
 def _replaced(local: Block, given: Orientations, made: Replacement) -> tuple[str, ...]:
     """Start angles that were not used, one sentence for photographs that are off alike."""
     said, turned = [], np.degrees(given.turned_to(made.orientations))
-    for remedy, rows in _alike(local, made):
+    for convention, rows in _alike(local, made):
         off = f"{turned[rows[0]]:.0f}°" if len(rows) == 1 else f"{np.median(turned[rows]):.0f}° (median)"
-        agree = f"; they agree with {remedy}" if remedy else ""
+        agree = "" if convention is None else f"; they agree with {convention.remedy}"
         said.append(
             f"start angles of {photographs_in_words(local, rows)} were not used: they are {off} off what the tie "
             f"points give, which were taken instead{agree}"
@@ -104,19 +104,19 @@ def _replaced(local: Block, given: Orientations, made: Replacement) -> tuple[str
     return tuple(said)
 
 
-def _alike(local: Block, made: Replacement) -> list[tuple[str, np.ndarray]]:
-    """Photographs with new orientations by the convention that explains the given angles; '' where none does."""
+def _alike(local: Block, made: Replacement) -> list[tuple[Convention | None, np.ndarray]]:
+    """Photographs with new orientations by the convention that explains the given angles; None where none does."""
     rows = np.flatnonzero(made.new)
     given, order = local.images.angles, local.rotation
     found = np.full_like(given, np.nan)
     found[rows] = angles_from_rotation(made.orientations.rotation[rows], order)
     strip, groups = np.asarray(local.images.strip), []
-    together = convention_between(given[rows], found[rows], order) if len(rows) > 1 else ""
+    together = convention_between(given[rows], found[rows], order) if len(rows) > 1 else None
     for name in () if together else np.unique(strip[rows]):
         own = rows[strip[rows] == name]
-        remedy = convention_between(given[own], found[own], order) if len(own) > 1 else ""
-        if remedy:
-            groups.append((remedy, own))
+        convention = convention_between(given[own], found[own], order) if len(own) > 1 else None
+        if convention is not None:
+            groups.append((convention, own))
             rows = np.setdiff1d(rows, own)
     return groups + ([(together, rows)] if len(rows) else [])
 
