@@ -101,7 +101,7 @@ class Replacement:
 def given_orientations(local: Block) -> Orientations:
     """The orientations that a block in the local frame states."""
     images = local.images
-    known = np.isfinite(images.centre).all(axis=1) & np.isfinite(images.angles).all(axis=1)
+    known = np.asarray(np.isfinite(images.centre).all(axis=1) & np.isfinite(images.angles).all(axis=1))
     rotation = np.full((len(images), 3, 3), np.nan)
     rotation[known] = rotation_from_angles(images.angles[known], local.rotation)
     return Orientations(np.where(known[:, None], images.centre, np.nan), rotation)
@@ -117,7 +117,7 @@ def doubtful(local: Block, given: Orientations) -> np.ndarray:
         return suspect
     good = _largest_agreement(local, directions, given, suspect)
     good = _without_misses(local, directions, given, good, limit)
-    return given.known & ~good & np.isfinite(missed)
+    return np.asarray(given.known & ~good & np.isfinite(missed))
 
 
 def _limit(missed: np.ndarray) -> float:

@@ -102,9 +102,8 @@ def diagnose(
     ----------
     block : as it was given. adjust : what adjusts a block (`aerotri.pipeline.adjust`).
     result : its adjustment where there is one. frame : a local frame near the block where it has a CRS.
-    seconds : after this time nothing new is begun.
+    seconds : after this time nothing new is begun; the block as it is does not count.
     """
-    until = time.monotonic() + seconds
     whole, plain = block, _without_choices(block)
     block = _with_decisions(plain)
     said = _parts_in_words(block)
@@ -116,6 +115,7 @@ def diagnose(
         before = try_adjusting(block, adjust)
     elif result is not None:
         before = trial_of(result)
+    until = time.monotonic() + seconds
     model = free_model(block)
     if model is None or model.joined.sum() < 3:
         return ()
@@ -183,7 +183,9 @@ def _of_groups(block: Block, search: _Search) -> tuple[str, ...]:
     for hypothesis in of_groups(block, search.model):
         changed = hypothesis.change(block)
         local, model = search.local(changed), free_model(changed)
-        if search.is_over or local is None or model is None or model.joined.mean() < NEARLY_ALL:
+        if candidates and search.is_over:
+            break
+        if local is None or model is None or model.joined.mean() < NEARLY_ALL:
             continue
         found = fit(gather(local, model))
         candidates.append(_Candidate(hypothesis, found.cost, _with_start(changed, model, found)))

@@ -53,8 +53,9 @@ def of_single_attitudes(block: Block, evidence: Evidence, found: Fit) -> Iterato
         if found.placed is None or not 0 < len(off) < 0.5 * len(own.row):
             continue
         gnss, rows = block.gnss_ins, own.row[off]
-        is_ins = own.name == "ins" and gnss is not None
-        image, angles = (gnss.image[rows], gnss.angles) if is_ins else (rows, block.images.angles)
+        image, angles = rows, block.images.angles
+        if own.name == "ins" and gnss is not None:
+            image, angles = gnss.image[rows], gnss.angles
         subject = f"{SUBJECTS[(own.name,)]} of {photographs_in_words(block, image)}"
         expected = angles_from_rotation(expected_attitudes(own, found.placed)[off], block.rotation)
         convention = convention_between(angles[rows], expected, block.rotation)
