@@ -5,7 +5,8 @@ import pytest
 
 from aerotri.adjustment.datum import motions_of_images, motions_of_points
 from aerotri.pipeline.chain import adjust_keeping_system
-from aerotri.statistics.relative import local_cofactors, neighbouring_pairs, shape_of
+from aerotri.results.model_part import ModelRoot
+from aerotri.statistics.relative import local_cofactors, neighbouring_pairs, relative_covariances, shape_of
 from aerotri.statistics.similarity import fit_similarity
 from dense_algebra import TINY, dense_design
 from small_blocks import small_block, with_adjustment
@@ -21,6 +22,12 @@ def adjusted(seed=3, parameters="none", settings=None, **changes):
 
 def dense_left(found):
     """S·Q·Sᵀ of all unknowns and A·Q·Aᵀ, with Q and S written out in full."""
+    q, left, onto = dense_parts(found)
+    return left @ q @ left.T, onto @ q @ onto.T
+
+
+def dense_parts(found):
+    """Q, S and A of all unknowns."""
     u, state, design = found.system.unknowns, found.solution.state, dense_design(found)
     factor = found.system.factorise(found.solution.equations)
     shape = shape_of(found.system, found.solution, factor, local_cofactors(found)[0])
@@ -36,8 +43,7 @@ def dense_left(found):
     rows = n + s + (3 * shape.rows[:, None] + np.arange(3)).ravel()
     onto = np.zeros((7, len(g)))
     onto[:, rows] = np.linalg.solve(g[rows].T @ g[rows], g[rows].T)
-    left = np.eye(len(g)) - g @ onto
-    return left @ q @ left.T, onto @ q @ onto.T
+    return q, np.eye(len(g)) - g @ onto, onto
 
 
 @pytest.mark.parametrize("changes", [{}, WITHOUT_CONTROL], ids=["control", "positions"])
@@ -55,6 +61,30 @@ def test_against_dense_algebra(changes):
     # what the block as a whole does is most of σ where nothing but positions of metres holds it
     share = relative.medians / np.median(found.local.points.total_sigma[u.points], axis=0)
     assert (share < (1.0 if "gnss" not in changes else 0.1)).all()
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0], ids=["field", "groups"])
+def test_the_model_part_goes_the_same_way(noise):
+    """S·F·(S·F)ᵀ less what noise explains, S·(Q − Q·N_0·Q)·Sᵀ, of columns F that are far larger than the noise."""
+    found = adjusted()
+    u, sigma0 = found.system.unknowns, found.local.outcome.sigma0
+    q, left, onto = dense_parts(found)
+    n, s = 6 * len(u.images), len(u.shared)
+    columns = 30.0 * np.linalg.cholesky(q[n + s :, n + s :] + 1e-9 * np.eye(len(q) - n - s))
+    columns = np.vstack([np.zeros((n + s, columns.shape[1])), columns])
+    root = ModelRoot(columns[:n].reshape(-1, 6, columns.shape[1]), columns[n : n + s],
+                     columns[n + s :].reshape(-1, 3, columns.shape[1]), noise * sigma0**2)  # fmt: skip
+    factor = found.system.factorise(found.solution.equations)
+    got = relative_covariances(found.system, found.solution, factor, sigma0, local_cofactors(found), root)
+    control = dense_design(found)[2 * len(u.rays.image) :]
+    known = q @ control.T @ control @ q
+    rest = columns @ columns.T - noise * sigma0**2 * (q - known)
+    total = left @ (sigma0**2 * q + rest) @ left.T
+    each = np.arange(len(u.points))
+    points = total[n + s :, n + s :].reshape(len(each), 3, len(each), 3)[each, :, each]
+    assert got.points == pytest.approx(points, rel=1e-5, abs=1e-6 * np.abs(points).max())
+    similarity = onto @ (sigma0**2 * q + rest) @ onto.T
+    assert np.diagonal(got.similarity) == pytest.approx(np.diagonal(similarity), rel=1e-5)
 
 
 def test_neighbours_are_functions_of_the_whole_covariance():

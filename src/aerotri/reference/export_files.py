@@ -8,6 +8,7 @@ from dataclasses import replace
 from aerotri.diagnosis.finding import GRADES
 from aerotri.formats.gis.layers import ROLES
 from aerotri.reference.adjust_tables import CONTROL, GROUND, IMAGES, POINTS, RESIDUALS, WORK
+from aerotri.reference.head import GOOD_FOR
 from aerotri.reference.records import DescribedFile, Item, of_axes, within
 
 PLACE, LAYERS = "folder of export", "layers of result.gpkg"
@@ -91,6 +92,7 @@ STAC = (
         Item("processing:software", "object", "The program."),
         Item("processing:software.aerotri", "text", "Its version."),
         Item("aerotri:verdict", "text", "accepted, doubtful or rejected."),
+        Item("aerotri:good_for", "text", "What it is good for.", values=GOOD_FOR),
         Item("aerotri:reasons[]", "text", "Why it is not simply accepted."),
         Item("aerotri:sigma0", "number?", "σ0; 1 where the stated σ are right."),
         Item("aerotri:photographs", "whole", "Photographs adjusted."),

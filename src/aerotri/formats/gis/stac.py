@@ -167,7 +167,8 @@ def _outcome(adjusted: AdjustedBlock) -> dict[str, Any]:
     o, check = adjusted.outcome, adjusted.check.difference
     rms = [float(np.sqrt(np.mean(d[np.isfinite(d)] ** 2))) if np.isfinite(d).any() else None for d in check.T]
     return {
-        "aerotri:verdict": o.verdict, "aerotri:reasons": list(o.reasons), "aerotri:sigma0": number_or_none(o.sigma0),
+        "aerotri:verdict": o.verdict, "aerotri:good_for": o.good_for,
+        "aerotri:reasons": list(o.reasons), "aerotri:sigma0": number_or_none(o.sigma0),
         "aerotri:photographs": int((adjusted.images.rays > 0).sum()),
         "aerotri:points": int(np.isfinite(adjusted.points.xyz[:, 0]).sum()),
         "aerotri:control_points": len(adjusted.control), "aerotri:check_points": len(adjusted.check),

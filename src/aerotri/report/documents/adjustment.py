@@ -22,8 +22,9 @@ from aerotri.report.documents.parts import (
     verdict,
 )
 from aerotri.report.documents.words import NO_VALUE, Words, breakable
-from aerotri.report.quality import asprs_warning
+from aerotri.report.quality import asprs_warning, metre_digits
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.relative import medians
 
 MOST_POINTS = 500
 """Control or check points that are listed; chosen [C]: some ten pages, all are in control.csv and check.csv."""
@@ -41,6 +42,7 @@ def adjustment_report(adjusted: AdjustedBlock, context: Context, version: str) -
     words, o = context.words, adjusted.outcome
     parts: list[Part] = [verdict(words(f"verdict.{o.verdict or 'none'}"), words(f"verdict.{o.verdict or 'none'}_text"),
                                  [breakable(text) for text in o.reasons])]  # fmt: skip
+    parts += _good_for(adjusted, words)
     parts += [heading(words("report.accuracy")), *_accuracy(adjusted, words)]
     parts += [heading(words("report.adjusted")), pairs(_numbers(adjusted, words))]
     parts += [heading(words("report.groups")), accuracy_tables.group_table(adjusted, words)]
@@ -62,6 +64,21 @@ def adjustment_report(adjusted: AdjustedBlock, context: Context, version: str) -
     parts += [picture(file, words(f"figure.{name}"), narrow=name != "plan") for name, file in pictures]
     parts += [heading(words("report.settings")), *settings_parts(adjusted.block, words)]
     return document(context, words("report.title"), adjusted.block.crs, version, parts, files)
+
+
+def _good_for(adjusted: AdjustedBlock, words: Words) -> list[Part]:
+    """What the result is good for, with σ of positions, of heights and of the shape; nothing where it is not known."""
+    o, relative = adjusted.outcome, adjusted.relative
+    if not o.good_for or o.verdict == "rejected" or relative is None:
+        return []
+    held = np.isfinite(relative.position).all()
+    place = medians(adjusted.points.total_sigma) if held else np.full(3, np.nan)
+    digits, left = metre_digits(relative.points), relative.medians
+    sizes = {
+        "plan": words.number(float(place[:2].max()), digits), "height": words.number(float(place[2]), digits),
+        "shape": words.number(float(left[2]), digits), "shape_plan": words.number(float(left[:2].max()), digits),
+    }  # fmt: skip
+    return [paragraph(words(f"good_for.{o.good_for}")), paragraph(words("good_for.about", **sizes), small=True)]
 
 
 def _first(part: Part) -> Part:
