@@ -203,3 +203,41 @@ def test_nothing_is_said_first_where_nothing_is_doubtful(tmp_path):
     step = {"name": "dsm", "folder": "dsm", "what": "Surface", "status": "done", "reason": "", "seconds": 1.0,
             "arguments": ["dsm"]}  # fmt: skip
     assert "To know first" not in run_page({"source": "p", "steps": [step], "seconds": 1.0}, tmp_path, Head())
+
+
+SHAPE = "Good for its shape only. Relative to one another heights have ± 3 cm."
+ONLY_SHAPE = {"adjusted__good_for": "relative", "adjusted__purpose": SHAPE, "adjusted__scale": 0.048}
+
+
+@pytest.mark.parametrize(
+    ("kind", "relative"),
+    [("dsm", {"sigma_Z_m__relative": 0.012, "sigma_Z_m__adjustment_relative": 0.004}),
+     ("ortho", {"sigma_m__relative": QUANTILES | {"median": 0.0019}})],
+)  # fmt: skip
+def test_both_sigma_with_what_each_is_good_for(kind, relative):
+    """A block without control: the sentence comes first, and the σ of the shape stands beside the other."""
+    parts_of, content = PARTS[kind]
+    parts = parts_of(changed(content, **ONLY_SHAPE, **relative))
+    assert parts.doubts[0] == SHAPE
+    cards = {heading: number for heading, number, _ in parts.cards}
+    assert next(number for heading, number in cards.items() if "relative" in heading) in ("0.012 m", "0.0019 m")
+    text = " ".join(parts.sure)
+    assert "after a shift, rotation and scale of the whole" in text
+    assert "The scale is known to ± 4.8 %." in text
+
+
+def test_page_of_a_run_has_both_sigma_and_says_once_what_the_block_is_good_for(tmp_path):
+    surface = changed(DSM, **ONLY_SHAPE, sigma_Z_m__relative=0.012, sigma_Z_m__adjustment_relative=0.004)
+    adjusted = {"verdict": "accepted", "reasons": [], "good_for": "relative", "purpose": SHAPE}
+    for folder, name, content in (("dsm", "dsm", surface), ("result", "adjustment", adjusted)):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / f"{name}.json").write_text(json.dumps(content), encoding="utf-8")
+    steps = [
+        {"name": name, "folder": folder, "what": name, "status": "done", "reason": "", "seconds": 1.0, "arguments": []}
+        for name, folder in (("adjust", "result"), ("dsm", "dsm"))
+    ]
+    page = run_page({"source": "photographs", "steps": steps, "seconds": 2.0}, tmp_path, Head()).replace("\u00a0", " ")
+    first = page.partition("<h2>Steps</h2>")[0]
+    assert "Accepted, for its shape only" in first
+    assert first.count(SHAPE) == 1
+    assert "relative, for shape and volumes, 0.012 m" in first

@@ -17,7 +17,7 @@ from aerotri.diagnosis.purpose import beside_verdict
 from aerotri.report.pages.dense import dense_parts
 from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.pages.ortho import ortho_parts
-from aerotri.report.pages.product import FileText, ProductParts, verdict_in_words
+from aerotri.report.pages.product import FileText, ProductParts, only_shape, verdict_in_words
 from aerotri.report.pages.volume import tonnes
 from aerotri.report.quality import printable, two_digits
 from aerotri.results.head import Head
@@ -102,8 +102,9 @@ def _doubts(done: Sequence[tuple[str, Path]]) -> dict[str, str]:
         parts = _parts_of(name, place)
         if parts is None:
             continue
-        verdict = verdict_in_words(_read(place / f"{name}.json"))
-        for number, text in enumerate(one for one in parts.doubts if one not in verdict):
+        content = _read(place / f"{name}.json")
+        elsewhere = {*verdict_in_words(content), only_shape(content)}
+        for number, text in enumerate(one for one in parts.doubts if one not in elsewhere):
             found.setdefault(text, []).append(parts.kind)
             rank.setdefault(text, number)
     return {text: " and ".join(found[text]).capitalize() for text in sorted(found, key=rank.__getitem__)}
