@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import aerotri
+from aerotri.diagnosis import diagnose
 from aerotri.functional_model.rotation import (
     angles_from_rotation,
     exponential,
@@ -15,7 +16,10 @@ from aerotri.functional_model.rotation import (
     rotation_from_angles,
 )
 from aerotri.observations import Block
-from aerotri.pipeline.starting import with_start
+from aerotri.pipeline import adjust
+from aerotri.pipeline.starting import Started, with_start
+from aerotri.results.adjusted_block import Outcome
+from aerotri.results.failure import AdjustmentFailedError
 from aerotri.simulation import parse_spec, simulate
 from rig_blocks import rig_block
 from small_blocks import small_block
@@ -106,6 +110,48 @@ def test_adjustment_is_that_of_right_start_values_and_says_what_was_wrong():
     assert wrong.verdict == right.verdict == "accepted"
     assert wrong.sigma0 == pytest.approx(right.sigma0, rel=1e-6)
     assert any("they are 120° off" in said for said in wrong.adjusted.outcome.warnings)
+
+
+CAMERA = dict(camera_name="drone", camera_size=(640, 480), pixel_um=7.5, focal_length_mm=4.8, image_sigma_px=0.1,
+              flight_axis="+y", free_interior=True)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("orientations", "words"),
+    [
+        ("eo_bad.txt", "start angles of photograph 1_002 were not used: they are 122° off"),
+        ("all_om180.txt", "start angles of all 12 photographs were not used"),
+    ],
+)
+def test_orientations_turned_over_do_no_harm_to_a_block_that_the_rest_determines(orientations, words, shared_data):
+    folder = shared_data("doors") / "crash_eigenvalues"
+    block = aerotri.read(
+        folder / "sim_bingo.txt", orientation=folder / orientations, positions=folder / "sim_geo.txt",
+        control=folder / "sim_p4gcp.csv", crs="EPSG:32632", **CAMERA,
+    ).block  # fmt: skip
+    result = aerotri.adjust(block, explain=False).adjusted
+    assert result.outcome.status == "converged"
+    assert result.outcome.sigma0 < 2.0
+    assert words in " ".join(result.outcome.warnings)
+
+
+@pytest.mark.parametrize(("folder", "remedy"), [("strip_mirrored", "x negated"), ("rows_flipped", "y negated")])
+def test_strip_that_is_mirrored_is_named(folder, remedy, shared_data):
+    block = aerotri.read_block(shared_data("doors") / folder)
+    said = diagnose(block, adjust)
+    assert said[0].startswith("strip 2: the measurements fit")
+    assert remedy in said[0]
+
+
+def test_start_that_does_not_fit_is_blamed_and_not_the_principal_distance():
+    runaway = Outcome("not converged", "the principal distance ran away", 3, *[np.nan] * 3, 10, 5, 0, 5)
+    failed = AdjustmentFailedError(replace(runaway, reasons=(runaway.message,)))
+    block = clean("control")
+    assert Started(block).blamed(failed) is failed
+    blamed = Started(block, ("strip 2 misses",), ("strip 2 misses",)).blamed(failed).outcome
+    assert blamed.reasons == (blamed.message,)
+    assert "strip 2 misses" in blamed.message
+    assert "principal distance" not in blamed.message
 
 
 def test_measurements_that_are_wrong_are_not_taken_for_start_angles():

@@ -19,7 +19,7 @@ from aerotri.pipeline.local import Report
 from aerotri.pipeline.model_part import with_model_part
 from aerotri.pipeline.relative import with_relative
 from aerotri.pipeline.shutter_test import with_shutter_test
-from aerotri.pipeline.starting import Started, with_start
+from aerotri.pipeline.starting import NOT_CONVERGED, Started, with_start
 from aerotri.pipeline.verdict import causes, judged, with_outcome
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.adjustment import Adjustment
@@ -27,7 +27,6 @@ from aerotri.results.failure import AdjustmentFailedError
 from aerotri.strategies.parameter_comparison import Progress
 from aerotri.strategies.shutter_test import asks_for_test
 
-NOT_CONVERGED = "not converged"
 MOST_CHOICES = 6
 """Sets of additional parameters that are tried where the adjustment with the one chosen does not converge [C]."""
 
@@ -83,7 +82,21 @@ def _from_start(
     sets: Progress | None,
 ) -> Adjustment:
     """As `adjust_keeping_system`, of a block with start values."""
-    choice, block = None, started.block
+    try:
+        return started.told(_adjusted(started.block, report, given_points, geoid, tested, sets))
+    except AdjustmentFailedError as error:
+        raise started.blamed(error) from error
+
+
+def _adjusted(
+    block: Block,
+    report: Report | None,
+    given_points: np.ndarray | None,
+    geoid: FilePath | None,
+    tested: bool,
+    sets: Progress | None,
+) -> Adjustment:
+    choice = None
     if block.settings.adjustment.additional_parameters == AUTO:
         choice = choose_parameters(block, geoid, sets)
         found, choice = _adjusted_as_chosen(choice, report, given_points, geoid)
@@ -95,7 +108,7 @@ def _from_start(
     found = judged(with_relative(with_model_part(found)))
     if tested and asks_for_test(block):
         found = with_shutter_test(found, report)
-    return started.told(found if choice is None else with_reason(found, choice))
+    return found if choice is None else with_reason(found, choice)
 
 
 def _adjusted_as_chosen(

@@ -43,11 +43,13 @@ Begin = Callable[[Block], tuple[Block, tuple[str, ...]]]
 class CheckedStart:
     """What takes the place of given orientations, and the sentences about it.
 
+    lost : of the sentences those about orientations that nothing replaces.
     begun : the block as it was started without its angles, where all of it was.
     """
 
     replacement: Replacement
     messages: tuple[str, ...]
+    lost: tuple[str, ...] = ()
     begun: Block | None = None
 
 
@@ -64,9 +66,11 @@ def checked_start(local: Block, begin: Begin) -> CheckedStart | None:
         return None
     if wrong.sum() <= MOST_WRONG * given.known.sum():
         made = oriented_anew(local, given, wrong)
-        return CheckedStart(made, _replaced(local, given, made) + _lost(local, made))
+        lost = _lost(local, made)
+        return CheckedStart(made, _replaced(local, given, made) + lost, lost)
     nothing = Replacement(given, np.zeros_like(wrong), wrong)
-    return _all_anew(local, given, begin) or CheckedStart(nothing, _lost(local, nothing))
+    lost = _lost(local, nothing)
+    return _all_anew(local, given, begin) or CheckedStart(nothing, lost, lost)
 
 
 def _all_anew(local: Block, given: Orientations, begin: Begin) -> CheckedStart | None:
@@ -79,7 +83,7 @@ def _all_anew(local: Block, given: Orientations, begin: Begin) -> CheckedStart |
     made = accepted(local, given, given_orientations(begun), given.known)
     if made.new.sum() < MOST * given.known.sum() or not _is_plausible(local, given, made.orientations):
         return None
-    return CheckedStart(made, (*_replaced(local, given, made), *messages), begun)
+    return CheckedStart(made, (*_replaced(local, given, made), *messages), (), begun)
 
 
 def _is_plausible(local: Block, given: Orientations, found: Orientations) -> bool:
@@ -129,6 +133,6 @@ def _lost(local: Block, made: Replacement) -> tuple[str, ...]:
     names = photographs_in_words(local, np.flatnonzero(made.lost))
     return (
         f"start orientation of {names}: image points miss the others by {np.degrees(np.nanmedian(missed)):.0f}° "
-        "(median), and no orientation was found that fits: check image points, names of points, positions and angles "
-        "there",
+        "(median), and no orientation was found that fits: check image points, names of points, positions, angles and "
+        "the principal distance",
     )

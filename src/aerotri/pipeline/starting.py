@@ -19,26 +19,40 @@ from aerotri.observations.rigs import station_places
 from aerotri.pipeline.given_starts import checked_start
 from aerotri.pipeline.verdict import with_outcome
 from aerotri.results.adjustment import Adjustment
+from aerotri.results.failure import AdjustmentFailedError
 from aerotri.tie_points.measured_start import MeasuredStart, misses, start_from_points
 
 HOLDS, MOST = 4.0, 0.9
 """Median miss of the rays, in tolerances, and share of the photographs with which a start from strips holds."""
 POINTS, STRIPS = "points", "strips"
+NOT_CONVERGED = "not converged"
 ORIENTING = "start values from the tie points"
 """The words for progress."""
 
 
 @dataclass(frozen=True, eq=False)
 class Started:
-    """A block with the orientations that its adjustment starts from, and what was done to find them, in sentences."""
+    """A block with the orientations that its adjustment starts from, and what was done to find them, in sentences.
+
+    lost : of them those about given orientations that do not fit and that nothing replaces.
+    """
 
     block: Block
     messages: tuple[str, ...] = ()
+    lost: tuple[str, ...] = ()
 
     def told(self, found: Adjustment) -> Adjustment:
         """The adjustment with these sentences among its warnings."""
         outcome = found.result.outcome
         return with_outcome(found, replace(outcome, warnings=(*self.messages, *outcome.warnings)))
+
+    def blamed(self, error: AdjustmentFailedError) -> AdjustmentFailedError:
+        """The failure of an adjustment from here: what it ran away to tells nothing where the start does not fit."""
+        outcome = error.outcome
+        if not self.lost or outcome.status != NOT_CONVERGED:
+            return error
+        message = f"the adjustment began with orientations that do not fit: {'; '.join(self.lost)}"
+        return AdjustmentFailedError(replace(outcome, message=message, reasons=(message,)))
 
 
 def with_start(block: Block, geoid: FilePath | None = None, say: Callable[[str], None] = lambda text: None) -> Started:
@@ -80,7 +94,7 @@ def _given_as_far_as_right(block: Block, local: Block, frame: LocalFrame | None,
         return Started(block)
     new = checked.replacement.new
     if not new.any():
-        return Started(block, checked.messages)
+        return Started(block, checked.messages, checked.lost)
     made = _oriented(block, checked.replacement.orientations.only(new), frame)
     rows, own = new[:, None], block.images
     images = replace(
@@ -89,7 +103,7 @@ def _given_as_far_as_right(block: Block, local: Block, frame: LocalFrame | None,
         angles=np.where(rows, made.images.angles, own.angles),
     )
     cameras = block.cameras if checked.begun is None else checked.begun.cameras
-    return Started(replace(block, images=images, cameras=cameras), checked.messages)
+    return Started(replace(block, images=images, cameras=cameras), checked.messages, checked.lost)
 
 
 def _from_measurements(block: Block, local: Block, frame: LocalFrame | None, say: Callable[[str], None]) -> Started:
