@@ -1,5 +1,8 @@
 """σ after a similarity of the whole block: against dense algebra, and errors of simulated blocks over it."""
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -61,6 +64,20 @@ def test_against_dense_algebra(changes):
     # what the block as a whole does is most of σ where nothing but positions of metres holds it
     share = relative.medians / np.median(found.local.points.total_sigma[u.points], axis=0)
     assert (share < (1.0 if "gnss" not in changes else 0.1)).all()
+
+
+@pytest.mark.parametrize("photographs", [2, 3])
+def test_blocks_of_two_rays_have_a_shape(photographs):
+    """Two photographs, and three in a line with few points of three rays, all control held: σ and no warning."""
+    flight = TINY["flight"] | {"strips": 1, "images_per_strip": photographs}
+    block = small_block(1, flight=flight, tie_points=TINY["tie_points"] | {"per_image": 9})[0]
+    held = replace(block, control=replace(block.control, sigma=np.zeros_like(block.control.sigma)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = adjust_keeping_system(held).local
+    sigma = found.relative.points[np.isfinite(found.points.sigma).all(axis=1)]
+    assert (sigma > 0.0).all()
+    assert (found.relative.medians < 1.0).all()
 
 
 @pytest.mark.parametrize("noise", [0.0, 1.0], ids=["field", "groups"])

@@ -24,6 +24,8 @@ def with_relative(found: Adjustment) -> Adjustment:
     u = system.unknowns
     if solution.status != "converged" or not sigma0 > 0.0 or len(u.points) < FEWEST_POINTS:
         return found
+    if not np.isfinite(solution.state.points).all() or not np.isfinite(solution.state.centre).all():
+        return found
     factor = system.factorise(solution.equations)
     covariances = relative_covariances(system, solution, factor, sigma0, local_cofactors(found), found.model)
     relative = _in_frame(found.local, found.frame, covariances, u.points, u.images)

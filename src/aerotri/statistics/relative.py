@@ -38,7 +38,9 @@ from aerotri.statistics.model_part import positive_part
 
 MOTIONS = 7
 ENOUGH_RAYS = 3
-"""Rays of a datum point, where there are points with so many: two rays test nothing."""
+"""Rays of a datum point, where enough points have so many: two rays test nothing."""
+FEWEST, SHARE = 8, 0.2
+"""Points, and share of all, that have rays enough for the others to be left out; chosen [C]: fewer do not span it."""
 LOOSE = 5.0
 """Points whose relative σ, or distance from the middle, is so many times the median do not say what the shape is;
 chosen [C]."""
@@ -138,7 +140,9 @@ def shape_of(system: NormalSystem, solution: Solution, factor: Factor, q_points:
 def _spread_rows(unknowns: Unknowns, points: np.ndarray) -> np.ndarray:
     """Rows of points with rays enough that do not lie far off."""
     rays = np.diff(unknowns.rays.start)
-    enough = rays >= min(ENOUGH_RAYS, int(rays.max()))
+    enough = rays >= ENOUGH_RAYS
+    if enough.sum() < max(FEWEST, SHARE * len(rays)):
+        enough = rays >= 1
     far = np.linalg.norm(points - np.median(points[enough], axis=0), axis=1)
     return np.flatnonzero(enough & (far <= LOOSE * np.median(far[enough])))
 
@@ -152,6 +156,7 @@ def _shape_over(
     of_datum = points[rows].reshape(-1, MOTIONS)
     a = np.zeros_like(points)
     size = np.linalg.norm(of_datum, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
     # points in a line leave a rotation about it: the pseudo-inverse takes the other six
     inverse = np.linalg.pinv(of_datum / size, rcond=DEGENERATE) / size[:, None]
     a[rows] = inverse.T.reshape(-1, 3, MOTIONS)
