@@ -18,7 +18,7 @@ from aerotri.observations import Block, PhotographFieldSettings
 from aerotri.pipeline.starting import with_start
 from aerotri.pipeline.verdict import with_outcome
 from aerotri.results.adjustment import Adjustment
-from aerotri.results.parameter_comparison import Choice, ParameterComparison
+from aerotri.results.parameter_comparison import Choice, ParameterComparison, SetOutcome
 from aerotri.strategies.compared_sets import compare_sets
 from aerotri.strategies.moving_sets import moving_outcomes, names_of_strips
 from aerotri.strategies.parameter_choice import Chosen, choose, sets_to_choose_from
@@ -100,13 +100,14 @@ def choose_parameters(
     prepared = _prepared_without(block, geoid)
     settings = prepared.system.unknowns.block.settings.adjustment
     options = SolveOptions(settings.max_iterations, settings.robust, step_tolerance=CHOICE_TOLERANCE)
-    strips = names_of_strips(prepared)
-    comparer = SetComparer(prepared, FOLDS, options, sampled_status(prepared), strips)
-    sets, outcomes = sets_to_choose_from(block), []
-    for number, choice in enumerate(sets, start=1):
-        if progress is not None:
-            progress(number, len(sets) + 1, set_name(choice))
-        outcomes.append(comparer.outcome(Candidate(choice)))
+    strips, sets = names_of_strips(prepared), sets_to_choose_from(block)
+    sample = sampled_status(prepared)
+    comparer = SetComparer(prepared, FOLDS, options, sample, strips)
+    outcomes = _outcomes(comparer, sets, progress)
+    if not any(outcome.converged for outcome in outcomes) and (sample != prepared.ray_status).any():
+        # a part of a block may be loose where the whole is not
+        comparer = SetComparer(prepared, FOLDS, options, strips=strips)
+        outcomes = _outcomes(comparer, sets, progress)
     if progress is not None:
         progress(len(sets) + 1, len(sets) + 1, "parameters that change")
     outcomes += moving_outcomes(comparer, prepared, strips, outcomes)
@@ -116,6 +117,16 @@ def choose_parameters(
     else:
         chosen = Chosen("none", (), "no set of additional parameters could be adjusted: adjusted without")
     return ParameterChoice(compared, chosen, block, strips)
+
+
+def _outcomes(comparer: SetComparer, sets: Sequence[Choice], progress: Progress | None) -> list[SetOutcome]:
+    """Every set, adjusted from where the one before it ended; one step of `progress` is left for what comes after."""
+    outcomes = list[SetOutcome]()
+    for number, choice in enumerate(sets, start=1):
+        if progress is not None:
+            progress(number, len(sets) + 1, set_name(choice))
+        outcomes.append(comparer.outcome(Candidate(choice)))
+    return outcomes
 
 
 def choose_again(made: ParameterChoice, status: str) -> ParameterChoice | None:

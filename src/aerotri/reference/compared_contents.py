@@ -63,6 +63,19 @@ COMPARE_PARAMETERS = (
         "sets[].prediction.value", "number?", "Sum of control and the mean of areas and strips, less that of the best."
     ),
     Item("sets[].prediction.standard_error", "number?", "Standard error of value."),
+    Item(
+        "sets[].bends",
+        "object?",
+        "Where the set changes the shape of the object by more than its image points can measure; null elsewhere. auto "
+        "does not take such a set.",
+    ),
+    Item("sets[].bends.against", "text", "The smaller set from which its object differs most."),
+    Item(
+        "sets[].bends.leverage",
+        "number",
+        "By how much more than the image points, changed as these two sets change them, could move the object if the "
+        "photographs stayed where they are.",
+    ),
     *_gain("sets[].behind", "How it stands against the best of all sets; null where it has no result."),
 )
 CHOICE = Item("choice", "text", "Which set auto would take and why, in a sentence.")

@@ -60,6 +60,24 @@ class Evidence:
     sigma_height: float
 
 
+@dataclass(frozen=True, eq=False)
+class AdjustedObject:
+    """The object as an adjustment has it, and what it leaves of the image points.
+
+    Parameters
+    ----------
+    point : (k,) rows of the block's points that have enough rays. xyz : (k, 3) m.
+    reach : (k,) m per rad, how far a point moves where all its rays err and the photographs stay; NaN where unknown.
+    ray : (m,) rows of the block's image points. residual : (m, 2) rad, times the root of their robust weight.
+    """
+
+    point: np.ndarray
+    xyz: np.ndarray
+    reach: np.ndarray
+    ray: np.ndarray
+    residual: np.ndarray
+
+
 NOTHING_KNOWN = Evidence(np.zeros(0), np.zeros(0), np.zeros(0), float("nan"))
 
 
@@ -79,6 +97,7 @@ class SetOutcome:
     groups : column of images.csv ('strip' among them) whose groups have values of their own, '' where there are none.
     kind : how they are tied, 'independent' or 'walk'. p : probability of their differences where there are none.
     ratio : −2·ln of the restricted likelihood ratio against one set of values for all photographs.
+    object : what it makes of the object, None where that is not known.
     """
 
     name: str
@@ -100,6 +119,7 @@ class SetOutcome:
     kind: str = "free"
     p: float = float("nan")
     ratio: float = float("nan")
+    object: AdjustedObject | None = None
 
     @property
     def converged(self) -> bool:

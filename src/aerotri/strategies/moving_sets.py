@@ -10,6 +10,7 @@ from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.shared_parameters import cameras_of_groups
 from aerotri.results.parameter_comparison import SetOutcome
 from aerotri.statistics.clusters import OF_ONE_EXPOSURE, cluster_schemes
+from aerotri.strategies.object_change import far_moved
 from aerotri.strategies.parameter_choice import distances
 from aerotri.strategies.parameter_comparison import Candidate, SetComparer
 
@@ -64,7 +65,9 @@ def moving_outcomes(
 
 
 def _best(comparer: SetComparer, outcomes: Sequence[SetOutcome]) -> list[SetOutcome]:
-    """Sets of parameters, a random field not among them, that predict best."""
+    """Sets of parameters, a random field not among them, that predict best of those that do not bend the object."""
+    far = far_moved([o for o in outcomes if o.converged])
+    outcomes = [o for o in outcomes if o.name not in far]
     behind = distances(comparer.comparison(outcomes))
     known = [
         o for o in outcomes

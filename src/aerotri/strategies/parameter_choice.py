@@ -11,7 +11,7 @@ them the one with the largest σ of heights is taken. Blocks too small to be div
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import stdtrit
@@ -20,6 +20,7 @@ from aerotri.conventions import InputError, counted
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.observations import Block
 from aerotri.results.parameter_comparison import Choice, ParameterComparison, SetOutcome
+from aerotri.strategies.object_change import FarMoved, far_moved, frees_the_lens
 
 RESAMPLES = 400
 """Bootstrap samples of the control points: the standard error from them is itself good to 1/√800, 3.5 % [D]; more
@@ -31,14 +32,18 @@ NEGLIGIBLE = 4.0
 """Difference of −2 ln of the density within which two sets are alike whatever its standard error [C]: a likelihood
 ratio of 7."""
 
-COMMON = ("brown", "lens:k1+k2+k3+p1+p2", "bluh:1-12", "gruen", "legendre:5x5", "collocation:13x9")
+LENS = "lens:k1+k2+k3+p1+p2"
+FIELD = "collocation:13x9"
+COMMON = ("brown", LENS, "bluh:1-12", "legendre:5x5", FIELD, f"{LENS},{FIELD}")
 OF_MODEL = {
     "ultracam_d": ("ultracam_d:42-73", "bluh:1-12,ultracam_d:42-73", "ultracam_d:42-73,collocation:13x9"),
     "dmc": ("dmc", "bluh:1-12,dmc:30-41+74-77", "dmc:30-41+74-77,collocation:13x9"),
 }
 
 
-OF_SMALL_BLOCKS = ("brown:K1+K2+K3+P1+P2", "lens:k1+k2+k3+p1+p2", "bluh:1-12", "none")
+OF_SMALL_BLOCKS = ("brown:K1+K2+K3+P1+P2", LENS, "bluh:1-12", "none")
+HOLD_THE_LENS = ("none", FIELD)
+"""Sets that keep the lens as it is given, or near it."""
 FEW_PHOTOGRAPHS = 18
 """Photographs below which only sets of a dozen parameters are tried [C]."""
 
@@ -97,7 +102,7 @@ def sets_to_choose_from(block: Block) -> tuple[Choice, ...]:
 
 
 def candidate_sets(block: Block) -> tuple[Choice, ...]:
-    """The sets worth comparing for the cameras of a block; none among them unless the lens has start values only."""
+    """The sets worth comparing for the cameras of a block; some hold the lens unless it has start values only."""
     models = {block.cameras[k].model for k in set(block.images.camera.tolist())}
     specs: list[str] = list(COMMON)
     for model, own in OF_MODEL.items():
@@ -108,11 +113,11 @@ def candidate_sets(block: Block) -> tuple[Choice, ...]:
 
 
 def _parsed(specs: Sequence[str], block: Block) -> tuple[Choice, ...]:
-    """The sets, without "none" where a lens has start values: it would hold what these image points alone gave."""
+    """The sets, where a lens has start values without those that would hold what these image points alone gave."""
     cameras = [block.cameras[k] for k in set(block.images.camera.tolist())]
     values = [prior for camera in cameras for part in (camera.lens, camera.brown) for prior in part.values()]
     start_only = any(prior.kind == "free" and prior.value for prior in values)
-    return tuple(parse_parameters(spec) for spec in specs if not (start_only and spec == "none"))
+    return tuple(parse_parameters(spec) for spec in specs if not (start_only and spec in HOLD_THE_LENS))
 
 
 def choose(comparison: ParameterComparison) -> Chosen:
@@ -126,23 +131,37 @@ def choose(comparison: ParameterComparison) -> Chosen:
     there = [o for o in comparison.outcomes if o.converged]
     if not there:
         raise InputError("the block cannot be adjusted with any set of additional parameters", "try --parameters none")
-    behind = distances(comparison)
+    far = far_moved(there)
+    there = [o for o in there if o.name not in far]
+    borne = replace(comparison, outcomes=tuple(there))
+    behind = distances(borne)
     if not behind:
         found = min(there, key=lambda o: o.bic)
         why = "the block is too small to predict one part by another: chosen by BIC alone"
-        return _chosen(found, f"additional parameters chosen: {found.name}; {why}")
-    alike = [o for o in there if o.name in behind and behind[o.name].alike]
-    found = max(alike, key=lambda o: (np.nan_to_num(o.evidence.sigma_height), o.effective))
-    return _chosen(found, _reason(found, alike, behind, comparison))
-
-
-def _chosen(found: SetOutcome, reason: str) -> Chosen:
+        reason = f"additional parameters chosen: {found.name}; {why}"
+    else:
+        alike = [o for o in there if o.name in behind and behind[o.name].alike]
+        # without control no σ says which is the more cautious: the lens free, and little that could bend
+        found = max(alike, key=lambda o: (np.nan_to_num(o.evidence.sigma_height), frees_the_lens(o), -o.effective))
+        reason = _reason(found, alike, behind)
+    reason += f"; {counted(len(comparison.outcomes), 'set')} compared{_left_out(found, comparison, far)}"
     return Chosen(found.name, found.choice, reason, found.groups, found.kind)
 
 
-def _reason(
-    found: SetOutcome, alike: Sequence[SetOutcome], behind: dict[str, Behind], comparison: ParameterComparison
-) -> str:
+def _left_out(found: SetOutcome, comparison: ParameterComparison, far: dict[str, FarMoved]) -> str:
+    """A sentence about sets that fit the image points better and bend the object; nothing where there is none."""
+    better = [o.name for o in comparison.outcomes if o.name in far and o.sigma0 < found.sigma0]
+    if not better:
+        return ""
+    worst = max((far[name] for name in better), key=lambda one: one.leverage)
+    return (
+        f". Not taken though they fit the image points better: {', '.join(better)}. They bend the block up to "
+        f"{worst.leverage:.0f} times as far as their image points can measure. Only control points or precise "
+        "positions of the photographs could confirm that"
+    )
+
+
+def _reason(found: SetOutcome, alike: Sequence[SetOutcome], behind: dict[str, Behind]) -> str:
     count, points = len(found.evidence.areas), int(np.isfinite(found.evidence.control).sum())
     by = f"the image points of {count} areas of the block"
     if points:
@@ -152,7 +171,7 @@ def _reason(
         others = ", ".join(o.name for o in alike if o is not found)
         text = (
             f"additional parameters chosen: {found.name}. They predict {by}, each from everything else, as well as "
-            f"{others}, and their σ are the largest of these"
+            f"{others}, and {'their σ are the largest' if _known_sigma(found) else 'they are the fewest'} of these"
         )
     name, next_best = min(
         ((name, b) for name, b in behind.items() if not b.alike), key=lambda one: one[1].value, default=("", None)
@@ -162,7 +181,12 @@ def _reason(
         text += f". {name} is the best of the others, worse by {times:.0f} times the standard error of the difference"
     if found.groups:
         text += f". The parameters change by {found.groups} (probability of this by chance {found.p:.0e})"
-    return text + f"; {counted(len(comparison.outcomes), 'set')} compared"
+    return text
+
+
+def _known_sigma(outcome: SetOutcome) -> bool:
+    """Whether control says how sure the heights are that a set predicts."""
+    return bool(np.isfinite(outcome.evidence.sigma_height))
 
 
 def distances(comparison: ParameterComparison) -> dict[str, Behind]:

@@ -41,6 +41,7 @@ from aerotri.statistics.summarise import count_observations, effective_redundanc
 from aerotri.strategies.control_prediction import control_rows, predict_control
 from aerotri.strategies.deviation_estimation import with_estimated_deviations
 from aerotri.strategies.field_estimation import ReducedToFields, covariance_in_use, with_estimated_fields
+from aerotri.strategies.object_change import object_of
 from aerotri.strategies.parameter_evidence import Divisions, divisions_of, evidence_of
 
 SIGNIFICANT_T = 1.96
@@ -169,7 +170,7 @@ class SetComparer:
         assert self._divisions is not None
         evidence = evidence_of(system, solution, factor, self._status, self._divisions, predicted, sigma0**2)
         check, control = Accuracy.of(_check_differences(u, solution.state)), Accuracy.of(predicted.difference)
-        return replace(found, check=check, control=control, evidence=evidence)
+        return replace(found, check=check, control=control, evidence=evidence, object=object_of(system, solution))
 
 
 def with_candidate(block: Block, candidate: Candidate, strips: np.ndarray | None) -> Block:

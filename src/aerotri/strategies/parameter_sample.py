@@ -18,6 +18,8 @@ MOST_PHOTOGRAPHS = 600
 RAYS_A_PHOTOGRAPH = 60
 """Image points of a photograph that a sample keeps at least, where it has so many [C]: a point for each cell of 9 × 7,
 and with hundreds of photographs some tens of thousands of rays."""
+HELD_BY = 3
+"""Control points that hold a block without positions of its photographs: an area with fewer has no datum."""
 PLACES_TRIED = 30
 """Places at most where the area of a sample may lie [C]."""
 
@@ -26,7 +28,7 @@ def sampled_status(prepared: Prepared) -> np.ndarray:
     """(m,) status of the rays with those outside the sample off; that of the block where it is small enough.
 
     The area is where most control points are; of its object points those with the most rays stay, until every
-    photograph has enough, and every point whose coordinates are given.
+    photograph has enough, and every point whose coordinates are given. Control alone has to hold the area as well.
     """
     u = prepared.system.unknowns
     status = prepared.ray_status.copy()
@@ -34,9 +36,19 @@ def sampled_status(prepared: Prepared) -> np.ndarray:
     if inside is not None:
         off = np.ones(len(u.block.images), dtype=bool)
         off[inside] = False
-        status[(status == RayStatus.USED) & off[u.block.image_points.image]] = RayStatus.OFF
-        status = with_lonely_rays(u.block, status)
+        of_area = status.copy()
+        of_area[(status == RayStatus.USED) & off[u.block.image_points.image]] = RayStatus.OFF
+        of_area = with_lonely_rays(u.block, of_area)
+        if u.block.gnss_ins is not None or _control_seen(u, of_area) >= min(_control_seen(u, status), HELD_BY):
+            status = of_area
     return with_lonely_rays(u.block, _thinned(u, status))
+
+
+def _control_seen(unknowns: Unknowns, status: np.ndarray) -> int:
+    """Control points with two rays or more."""
+    rays = unknowns.block.image_points
+    count = np.bincount(rays.point[status == RayStatus.USED], minlength=len(unknowns.block.points))
+    return int(np.sum(count[unknowns.points[(unknowns.prior_weight > 0.0).any(axis=1)]] >= 2))
 
 
 def _area(unknowns: Unknowns, centre: np.ndarray, points: np.ndarray) -> np.ndarray | None:

@@ -11,12 +11,14 @@ from aerotri.diagnosis.parameter_sets import verdict
 from aerotri.formats.results.json_text import number_or_none
 from aerotri.image_errors import Change
 from aerotri.results.parameter_comparison import ParameterComparison, SetOutcome
+from aerotri.strategies.object_change import FarMoved, far_moved
 from aerotri.strategies.parameter_choice import Behind, Gain, distances, gains, standings
 
 
 def comparison_json(comparison: ParameterComparison) -> dict[str, Any]:
     """Content of compare_parameters.json; what is not known is null."""
     found, behind, distance = gains(comparison), standings(comparison), distances(comparison)
+    far = far_moved([o for o in comparison.outcomes if o.converged])
     return {
         "block": comparison.block,
         "folds": comparison.folds,
@@ -24,7 +26,8 @@ def comparison_json(comparison: ParameterComparison) -> dict[str, Any]:
         "check_points": list(comparison.check_points),
         "control_points": list(comparison.control_points),
         "sets": [
-            _set_json(o, found.get(o.name), behind.get(o.name), distance.get(o.name)) for o in comparison.outcomes
+            _set_json(o, found.get(o.name), behind.get(o.name), distance.get(o.name)) | _bent_json(far.get(o.name))
+            for o in comparison.outcomes
         ],
     }
 
@@ -52,6 +55,10 @@ def _set_json(o: SetOutcome, gain: Gain | None, behind: Gain | None, distance: B
     }
     content |= {"gain": _gain_json(gain), "behind": _gain_json(behind), "verdict": verdict(o, gain, behind)}
     return content
+
+
+def _bent_json(far: FarMoved | None) -> dict[str, Any]:
+    return {"bends": None if far is None else {"against": far.against, "leverage": number_or_none(far.leverage)}}
 
 
 def _gain_json(gain: Gain | None) -> dict[str, Any] | None:
