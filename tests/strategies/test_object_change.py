@@ -144,11 +144,10 @@ def shape_error(block: aerotri.Block, truth: np.ndarray, parameters: str) -> flo
 def test_a_flight_without_control_keeps_its_shape(kind):
     """The set chosen by default does about as well as the best one, which only the truth can name."""
     ratios = []
-    for seed in (1, 2, 3):
+    for seed in (1, 2):
         block, truth = flight(seed, kind)
         best = min(shape_error(block, truth, spec) for spec in FIXED_SETS)
         ratios.append(shape_error(block, truth, "auto") / best)
-    print(kind, ratios)
     assert np.exp(np.mean(np.log(ratios))) < 1.4
     assert max(ratios) < 2.5
 
