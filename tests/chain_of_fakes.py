@@ -47,6 +47,7 @@ class Saved:
 
     notes = ()
     block = FakeBlock("a block")
+    misplaced = ""
 
     def save(self, out, *given, **settings):
         out.mkdir(parents=True, exist_ok=True)

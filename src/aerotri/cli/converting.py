@@ -299,7 +299,7 @@ def tiepoints(
         executor=executor,
         project=project,
     )
-    run_tiepoints(photographs, out, options, json_, overwrite)
+    raise typer.Exit(run_tiepoints(photographs, out, options, json_, overwrite))
 
 
 def _stated_sigmas(control: str, positions: str, orientation: str, angles: str) -> dict[str, Any]:

@@ -102,7 +102,11 @@ def run(
     plots: Annotated[bool, typer.Option(help="Draw the plots of the adjustment.", rich_help_panel=OUTPUT)] = True,
     go_on: Annotated[
         bool,
-        typer.Option("--go-on", help="Go on after an adjustment that was rejected.", rich_help_panel=METHOD),
+        typer.Option(
+            "--go-on",
+            help="Go on after an adjustment that was rejected, or without a place that can be trusted.",
+            rich_help_panel=METHOD,
+        ),
     ] = False,
     unmarked: Annotated[
         str,

@@ -14,6 +14,10 @@ from aerotri.formats.assembly.camera_spec import CameraSpec
 from aerotri.formats.results.json_text import json_text
 from aerotri.tie_points.settings import DEFAULTS
 
+HEADING = "control point"
+MOST_LINES = 40
+"""Control points that are printed; all of them stand in tiepoints.json."""
+
 
 @dataclass(frozen=True)
 class TiePointOptions:
@@ -35,8 +39,8 @@ class TiePointOptions:
     project: Path | None = None
 
 
-def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bool, overwrite: bool = False) -> None:
-    """Tie and write; arguments as on the command line.
+def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bool, overwrite: bool = False) -> int:
+    """Tie and write; arguments as on the command line. Exit code: 1 where the block has no place that can be trusted.
 
     Raises
     ------
@@ -66,6 +70,9 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
         print(json_text(content, None))
     else:
         console.lines(outcome_lines(content, out))
+    if tied.misplaced:
+        console.failure(tied.misplaced)
+    return 1 if tied.misplaced else 0
 
 
 def outcome_lines(content: dict[str, Any], out: Path) -> list[str]:
@@ -73,6 +80,7 @@ def outcome_lines(content: dict[str, Any], out: Path) -> list[str]:
     pairs, per = content["pairs"], content["points_per_photograph"]
     said = [
         *content["messages"],
+        *placement_lines(content["placement"]),
         f"{content['photographs']} photographs in {content['crs']}, {pairs['tied']} of {pairs['compared']} pairs tied: "
         f"{content['tie_points']} tie points with {content['rays_per_point']:.1f} rays, "
         f"{per['median']:.0f} in a photograph ({per['smallest']} at least)",
@@ -85,3 +93,28 @@ def outcome_lines(content: dict[str, Any], out: Path) -> list[str]:
     if content["left_out"]:
         said.append(f"could not be tied and left out: {', '.join(content['left_out'])}")
     return [*said, f"Written to {out}"]
+
+
+def placement_lines(placement: dict[str, Any] | None) -> list[str]:
+    """A table of the control points that gave the block its place; none of positions, which are many."""
+    from aerotri.tie_points.placed import CONTROL
+
+    if placement is None or placement["by"] != CONTROL:
+        return []
+    points = placement["points"]
+    width = max(len(HEADING), *(len(point["name"]) for point in points[:MOST_LINES]))
+    heading = f"{HEADING:{width}} {'dX m':>9} {'dY m':>9} {'dZ m':>9} {'misfit':>9}  used"
+    more = [f"and {len(points) - MOST_LINES} more, see tiepoints.json"] if len(points) > MOST_LINES else []
+    return [heading, *(_row(point, width) for point in points[:MOST_LINES]), *more]
+
+
+def _row(point: dict[str, Any], width: int) -> str:
+    from aerotri.report.quality import printable
+    from aerotri.tie_points.georeferencing import AGREES
+
+    name = f"{printable(point['name']):{width}}"
+    if point["reason"]:
+        return f"{name} {'':39}  no: {point['reason']}"
+    offsets = " ".join(f"{value:9.3f}" for value in point["offset_m"])
+    used = "yes" if point["used"] else f"no: more than {AGREES:g} σ"
+    return f"{name} {offsets} {point['misfit_sigma']:7.1f} σ  {used}"

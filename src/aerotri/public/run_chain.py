@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
 OnStep = Callable[[Step, object], None]
 NOT_MARKED = "found control points that are marked in no photograph"
+NOT_PLACED = "found no place that can be trusted; --go-on builds on it all the same"
 
 
 class RunChain:
@@ -105,7 +106,10 @@ class RunChain:
             o = outcome.adjusted.outcome
             ending = "" if self._go_on else "is rejected; --go-on builds on it all the same"
             step = replace(step, status="failed", reason=f"{o.verdict}: {next(iter(o.reasons), o.message)}")
-        if verb == "tie_points" and step.status == "done" and self._stop:
+        if verb == "tie_points" and step.status == "done" and outcome.misplaced:
+            ending = "" if self._go_on else NOT_PLACED
+            step = replace(step, status="failed", reason=outcome.misplaced)
+        elif verb == "tie_points" and step.status == "done" and self._stop:
             self._project.unmarked = outcome.unmarked
             ending = NOT_MARKED if outcome.unmarked else ""
         step = replace(step, seconds=round(time.perf_counter() - begun, 1))

@@ -102,7 +102,8 @@ def run(
     dense : the dense surface, the orthophoto and, with a boundary, the volume on the dense surface as well.
     resolution : m, cell of the dense surface; two pixels on the ground where None.
     plots : draw the plots of the adjustment.
-    go_on : go on after an adjustment that was rejected.
+    go_on : go on after an adjustment that was rejected, and where the control points or positions do not fit the
+        photographs.
     unmarked : where control points are marked in no photograph, 'stop' after the tie points, or 'continue', as where
         None. A block of an earlier run in `out` that was marked since is taken up, unless 'stop' is given.
     further : more settings of a step by the name of its verb, {'terrain': {'window': 21}}.

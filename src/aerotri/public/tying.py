@@ -74,6 +74,16 @@ class TiedPhotographs:
         return unmarked_points(self.given.control)
 
     @property
+    def misplaced(self) -> str:
+        """Why the place of the block cannot be trusted, with what to look at; '' where it can."""
+        return "" if self.record.placed is None else self.record.placed.problem
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What looks wrong in the control points and the place, in sentences; they are among the messages."""
+        return self.record.doubts
+
+    @property
     def messages(self) -> tuple[str, ...]:
         """What was matched, assumed or left out, in sentences."""
         return self.record.messages

@@ -36,8 +36,6 @@ MOST = 0.9
 """Share of photographs, and of rays that fit, with which no other assumption on the cameras is tried."""
 FEWEST_FITTING = 0.5
 """Share of rays that fit below which the start is refused."""
-BENDING = 1e-3
-"""By how much a part may be bent, as a share of its extent."""
 SURE = 3.0
 """Width of a set of positions, in their σ, from which it tells the roll of a part."""
 FREE_DISTANCE_M = 100.0
@@ -254,12 +252,15 @@ def _in_place(
     on_line = len(target) < 3 or is_line(target) or (not first and _may_be_line(target, sigma))
     if len(target) < 2 or (on_line and (controls == len(target) or not first)):
         return None
-    extent = float(np.linalg.norm(np.ptp(target, axis=0)))
-    placement = place(source, target, np.hypot(sigma, BENDING * extent), looking, seed)
-    turned = placement.rotation @ part.rotation
-    what = [counted(len(target) - controls, "position")] if len(target) > controls else []
-    what += [counted(controls, "control point")] if controls else []
-    words = f"fit {' and '.join(what)} to {np.median(placement.misfit):.3g} m (median)"
+    placement = place(source, target, sigma, looking, seed)
+    turned, used = placement.rotation @ part.rotation, placement.used
+    shown = placement.misfit[used] if used.any() else placement.misfit
+    positions = len(target) - controls
+    what = [_of_all(used[:positions], "position")] if positions else []
+    what += [_of_all(used[positions:], "control point")] if controls else []
+    words = f"fit {' and '.join(what)} to {np.median(shown):.3g} m (median)"
+    if not placement.agreed:
+        words += ", which are few: positions and control points contradict one another or the photographs"
     if on_line:
         words += ", which lie on a line: taken to look down"
     elif not controls and -np.nanmean(turned[:, 2, 2]) > LOOKS_UP:
@@ -267,31 +268,37 @@ def _in_place(
     return placement(part.centre), turned, words
 
 
+def _of_all(used: np.ndarray, what: str) -> str:
+    """'12 positions', '9 of 12 positions'."""
+    every = counted(len(used), what)
+    return every if used.all() else f"{int(used.sum())} of {every}"
+
+
 def _references(block: Block, part: Mapped, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Points (k, 3) of a part, where they are (k, 3), σ (k,) m, and how many of them, at the end, are control points.
+    """Points (k, 3) of a part, where they are (k, 3), σ (k, 3) m, and how many of them, at the end, are control points.
 
     Positions stated as start values stand for those that are not observed.
     """
-    where, sigma = block.images.centre.copy(), np.zeros(len(block.images))
+    where, sigma = block.images.centre.copy(), np.zeros((len(block.images), 3))
     where[~np.isfinite(where).all(axis=1)] = np.nan
     if block.gnss_ins is not None:
         gnss = block.gnss_ins
         known = np.isfinite(gnss.xyz).all(axis=1) & np.isfinite(gnss.sigma).all(axis=1)
         rows = gnss.image[known]
-        where[rows], sigma[rows] = gnss.xyz[known], gnss.sigma[known].max(axis=1)
+        where[rows], sigma[rows] = gnss.xyz[known], gnss.sigma[known]
     there = np.isfinite(where[:, 0]) & np.isfinite(part.centre[:, 0])
     control = with_edits(block)[0].control
     usable = ~control.is_check & np.isfinite(control.xyz).all(axis=1)
     usable &= np.isfinite(points[control.point]).all(axis=1)
     source = np.concatenate([part.centre[there], points[control.point[usable]]])
     target = np.concatenate([where[there], control.xyz[usable]])
-    return source, target, np.concatenate([sigma[there], control.sigma[usable].max(axis=1)]), int(usable.sum())
+    return source, target, np.concatenate([sigma[there], control.sigma[usable]]), int(usable.sum())
 
 
 def _may_be_line(xyz: np.ndarray, sigma: np.ndarray) -> bool:
     """Whether the width of a set of positions (k, 3) may come from their errors alone."""
     size = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)
-    return bool(size[1] < SURE * np.linalg.norm(sigma))
+    return bool(size[1] < SURE * np.linalg.norm(sigma.max(axis=1)))
 
 
 def _anywhere(part: Mapped, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, str]:

@@ -11,17 +11,20 @@ from aerotri.adjustment.track import strips_of_track
 from aerotri.conventions import InputError
 from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block
+from aerotri.diagnosis.control_marks import Marks, marks_of
 from aerotri.formats.assembly import assemble
 from aerotri.formats.assembly.parts import OrientationList, PositionList, Reading, no_sigma
-from aerotri.formats.assembly.reprojection import reproject
 from aerotri.functional_model.rotation import angles_from_rotation, exponential, rotation_from_angles
 from aerotri.observations import Block, Camera
 from aerotri.tie_points.first_orientation import Mapped, map_incrementally
 from aerotri.tie_points.georeferencing import is_line, place
 from aerotri.tie_points.given import Given, complete, is_held_by_control
+from aerotri.tie_points.placed import CONTROL, POSITIONS, Placed, placed_by
 
 LEAST_SIGMA_M = 1e-3
 """Stands for less, 0 too, in the weights of control for a first orientation."""
+LOOKS_DOWN = 0.3
+"""Length of the mean direction of view, of 1, from which it is one: of photographs to all sides it says nothing."""
 SHORTEST_STRIP = 3.0
 """Photographs a strip has on average, where the track is one."""
 MOST_LOST = 0.1
@@ -40,6 +43,7 @@ class Oriented:
     ----------
     relative : centre (n, 3) and rotation (n, 3, 3) in a frame of the photographs alone, which no list of positions or
         control changes by a single bit; the same as the others where the orientation was given.
+    placed : how well it fits what it was brought onto; None where nothing was, or the orientation was given.
     """
 
     centre: np.ndarray
@@ -48,6 +52,7 @@ class Oriented:
     frame: LocalFrame | None
     messages: tuple[str, ...]
     relative: tuple[np.ndarray, np.ndarray]
+    placed: Placed | None = None
 
     def block_of(self, block: Block) -> Block:
         return replace(block, cameras=self.cameras)
@@ -165,37 +170,64 @@ def in_frame(block: Block, frame: LocalFrame | None) -> tuple[Block, np.ndarray,
 
 def _placed(block: Block, mapped: Mapped, frame: LocalFrame | None, seed: int) -> Oriented:
     """The first orientation brought onto control points, where three of them are marked, else onto positions."""
-    found = reproject(replace(block, cameras=mapped.cameras), mapped.centre, mapped.rotation)
     looking = -np.nanmean(mapped.rotation[:, :, 2], axis=0)
+    marks = marks_of(replace(block, cameras=mapped.cameras), mapped.centre, mapped.rotation)
     control = block.control
-    usable = ~control.is_check & np.isfinite(control.xyz).all(axis=1)
-    usable &= np.isfinite(found.points[control.point]).all(axis=1)
+    usable = ~control.is_check & np.isfinite(control.xyz).all(axis=1) & np.isfinite(marks.xyz[:, 0])
     target = control.xyz[usable]
     if len(target) >= 3 and not is_line(target):
-        source = found.points[control.point[usable]]
-        sigma = np.maximum(control.sigma[usable].max(axis=1), LEAST_SIGMA_M)
-        what = "control points"
+        local = target if frame is None else frame.to_local(target)
+        sigma = np.hypot(np.maximum(control.sigma[usable], LEAST_SIGMA_M), _sigma_of_marks(marks, usable, local))
+        sure = looking if np.linalg.norm(looking) > LOOKS_DOWN else None
+        placement = place(marks.xyz[usable], local, sigma, sure, seed)
+        names = block.points[control.point][~control.is_check]
+        reasons = _why_unusable(block, marks)
+        placed = placed_by(CONTROL, names, usable[~control.is_check], placement, reasons)
     else:
-        source, target, sigma = _positions_of(block, mapped)
-        what, usable = "positions", None
-    if len(source) < 2:
-        return _unplaced(block, mapped, looking)
-    local = target if frame is None else frame.to_local(target)
-    placement = place(source, local, sigma, None if what == "control points" else looking, seed)
-    median = float(np.median(placement.misfit))
-    said = f"the first orientation fits {len(source)} {what} to {median:.3g} m (median)"
+        names, source, target, sigma = _positions_of(block, mapped)
+        if len(source) < 2:
+            return _unplaced(block, mapped, looking)
+        local = target if frame is None else frame.to_local(target)
+        placement = place(source, local, np.maximum(sigma, LEAST_SIGMA_M), looking, seed)
+        placed = placed_by(POSITIONS, names, np.ones(len(names), bool), placement, [])
     rotation = placement.rotation @ mapped.rotation
     relative = mapped.centre, mapped.rotation
-    return Oriented(placement(mapped.centre), rotation, mapped.cameras, frame, (said,), relative)
+    said = (placed.sentence, *placed.doubts())
+    return Oriented(placement(mapped.centre), rotation, mapped.cameras, frame, said, relative, placed)
 
 
-def _positions_of(block: Block, mapped: Mapped) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _sigma_of_marks(marks: Marks, usable: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """(k, 1) m, what the marks of the usable points may err by; the scale from how far they are from their middle."""
+    source = marks.xyz[usable]
+    apart = [np.median(np.linalg.norm(xyz - np.median(xyz, axis=0), axis=1)) for xyz in (source, target)]
+    return marks.sigma[usable, None] * float(apart[1] / max(apart[0], 1e-300))
+
+
+def _why_unusable(block: Block, marks: Marks) -> list[str]:
+    """Of every control point, why it is not compared; '' where it may be."""
+    control, why = block.control, []
+    contradicted = {one.point for one in marks.contradictions}
+    rays = np.bincount(block.image_points.point, minlength=len(block.points))[control.point]
+    for k in np.flatnonzero(~control.is_check).tolist():
+        if not np.isfinite(control.xyz[k]).all():
+            why.append("not known in X, Y and Z")
+        elif rays[k] < 2:
+            why.append("marked in one photograph" if rays[k] else "not marked")
+        elif int(control.point[k]) in contradicted:
+            why.append("its marks do not meet")
+        else:
+            why.append("" if np.isfinite(marks.xyz[k, 0]) else "marked in too few oriented photographs")
+    return why
+
+
+def _positions_of(block: Block, mapped: Mapped) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Names of photographs, centres (k, 3) in the frame of the photographs, positions and σ (k, 3) m."""
     observed = block.gnss_ins
     if observed is None:
-        return no_sigma(0), no_sigma(0), np.zeros(0)
+        return np.zeros(0, str), no_sigma(0), no_sigma(0), no_sigma(0)
     there = np.isfinite(mapped.centre[observed.image, 0]) & np.isfinite(observed.xyz).all(axis=1)
     rows = observed.image[there]
-    return mapped.centre[rows], observed.xyz[there], observed.sigma[there].max(axis=1)
+    return block.images.names[rows], mapped.centre[rows], observed.xyz[there], observed.sigma[there]
 
 
 def _unplaced(block: Block, mapped: Mapped, looking: np.ndarray) -> Oriented:

@@ -36,6 +36,8 @@ def tie_points_json(tied: TiedBlock, seconds: float) -> dict[str, Any]:
             {"name": camera.name, "focal_length_mm": camera.focal_length_mm, "pixel_um": camera.pixel_um}
             for camera in block.cameras
         ],
+        "placement": None if tied.placed is None else tied.placed.as_json(),
+        "doubts": list(tied.doubts),
         "messages": list(tied.messages),
         "seconds": round(seconds, 1),
     }

@@ -12,6 +12,7 @@ import numpy as np
 from aerotri.adjustment.parallel import thread_count
 from aerotri.conventions import InputError, mm_from_px
 from aerotri.coordinates.blocks import transform_block
+from aerotri.diagnosis.control_points import doubts_before_adjustment
 from aerotri.execution.work import Workplace
 from aerotri.formats.assembly import assemble
 from aerotri.formats.assembly.parts import PositionList, Reading, no_sigma
@@ -33,6 +34,7 @@ from aerotri.tie_points.matching import MatchOptions, match_all, neighbours
 from aerotri.tie_points.misfit import adjusted_offsets, with_sigma_of_ties
 from aerotri.tie_points.orientation import Oriented, Progress, in_frame, orient, with_start_values
 from aerotri.tie_points.photographs import LENS, PhotographSet
+from aerotri.tie_points.placed import Placed
 from aerotri.tie_points.settings import DEFAULTS
 from aerotri.tie_points.tasks import bytes_of_search, features_elsewhere, matches_elsewhere
 from aerotri.tie_points.tracks import Measured, Tracks, join_matches, thin
@@ -70,6 +72,8 @@ class TiedBlock:
     block : with start values. points : (N, 3) m, start values of its points in its CRS, NaN where not known.
     median_px : residual of the start values. pairs : of photographs that were matched, and that have matches.
     left_out : names of photographs that could not be tied. messages : what the user should know.
+    placed : how well the first orientation fits control points or positions; None where neither placed it.
+    doubts : what looks wrong in the control points and the place, in sentences; they are among the messages.
     """
 
     block: Block
@@ -78,6 +82,8 @@ class TiedBlock:
     pairs: tuple[int, int]
     left_out: tuple[str, ...]
     messages: tuple[str, ...]
+    placed: Placed | None = None
+    doubts: tuple[str, ...] = ()
 
 
 def tie_photographs(
@@ -118,7 +124,9 @@ def tie_photographs(
     reading = complete(replace(Reading(block), messages=said), given, crs, positions)
     reading = with_start_values(reading, oriented.kept(keep))
     frame = oriented.frame
-    found = reproject(*in_frame(reading.block, frame))
+    placed_block = in_frame(reading.block, frame)
+    found = reproject(*placed_block)
+    about_control = doubts_before_adjustment(*placed_block)
     local = reading.block if frame is None else transform_block(reading.block, frame)
     offset_px, unsettled = adjusted_offsets(local, found.points, found.offset_px)
     block, sigma_px = with_sigma_of_ties(reading.block, offset_px, len(tracks))
@@ -133,9 +141,12 @@ def tie_photographs(
         messages=(
             *reading.messages,
             *oriented.messages,
+            *about_control,
             f"the standard deviation of tie points is {sigma_px:.2f} px, as they fit one another",
             *((unsettled,) if unsettled else ()),
         ),
+        placed=oriented.placed,
+        doubts=(*(() if oriented.placed is None else oriented.placed.doubts()), *about_control),
     )
 
 

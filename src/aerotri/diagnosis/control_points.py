@@ -1,0 +1,99 @@
+"""What looks wrong in the list of control and check points itself: sentences, each with what to look at."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from aerotri.adjustment.prepare import with_edits
+from aerotri.conventions import counted
+from aerotri.diagnosis.control_marks import listed, marks_of
+from aerotri.observations import Block
+
+SAME_PIXEL = 2.0
+"""Distance of two marks, px, within which they mark the same detail [C]: a mark is set to a pixel or two by hand."""
+SAME_PLAN_M = 1e-3
+"""Difference of X and Y up to which they are typed from the same place [C]: lists have millimetres."""
+FEWEST_OF_ZERO = 2
+"""Points whose heights are all 0 from which that is asked about: one may be the origin of a local system."""
+MOST_SHOWN = 5
+"""Pairs of points that are named [C]: more is a system, not a slip."""
+
+
+def doubts_before_adjustment(block: Block, centre: np.ndarray, rotation: np.ndarray) -> tuple[str, ...]:
+    """Sentences about control points: from start values, coordinates and marks.
+
+    Parameters
+    ----------
+    block : as it is given, not in a local frame: heights of 0 are 0 there. centre : (n, 3) m; rotation : (n, 3, 3)
+        camera → object, start values in a frame with three like axes; NaN for photographs without.
+    """
+    found = marks_of(block, centre, rotation).contradictions
+    return (*(one.sentence(block) for one in found), *doubts_of_control(block))
+
+
+def doubts_of_control(block: Block) -> tuple[str, ...]:
+    """Sentences about control points, from coordinates and marks alone."""
+    block, off = with_edits(block)
+    return (*_at_one_pixel(block, off), *_typed_twice(block), *_zero_heights(block))
+
+
+def _at_one_pixel(block: Block, off: np.ndarray) -> list[str]:
+    """Two points marked at one place of a photograph, though they lie apart."""
+    rays, control = block.image_points, block.control
+    row = np.full(len(block.points), -1)
+    row[control.point] = np.arange(len(control))
+    marks = np.flatnonzero(~off & (row[rays.point] >= 0))
+    pixel = np.array([camera.pixel_mm for camera in block.cameras])[block.images.camera[rays.image[marks]]]
+    place = rays.xy[marks] / pixel[:, None]
+    said: dict[tuple[int, int], str] = {}
+    for image in np.unique(rays.image[marks]).tolist():
+        own = np.flatnonzero(rays.image[marks] == image)
+        for a, b in _near(place[own]):
+            one, other = (int(row[rays.point[marks[own[k]]]]) for k in (a, b))
+            away = float(np.linalg.norm(np.nan_to_num(control.xyz[one] - control.xyz[other])))
+            if one == other or away <= SAME_PLAN_M:
+                continue
+            apart = float(np.linalg.norm(place[own[a]] - place[own[b]]))
+            names = listed(block.points[control.point[[one, other]]])
+            said[one, other] = (
+                f"control points {names} are marked at one place of {block.images.names[image]} ({apart:.2g} px "
+                f"apart), but lie {away:.3g} m apart: one of the two marks belongs to another point"
+            )
+    return list(said.values())[:MOST_SHOWN]
+
+
+def _near(place: np.ndarray) -> list[tuple[int, int]]:
+    """Pairs of places (k, 2) px within `SAME_PIXEL`."""
+    from scipy.spatial import KDTree
+
+    return sorted(KDTree(place).query_pairs(SAME_PIXEL)) if len(place) > 1 else []
+
+
+def _typed_twice(block: Block) -> list[str]:
+    """Points with one X and Y and different heights."""
+    control = block.control
+    known = np.flatnonzero(np.isfinite(control.xyz).all(axis=1))
+    order = known[np.lexsort(control.xyz[known].T)]
+    pairs = [
+        (a, b) for a, b in pairwise(sorted(order.tolist(), key=lambda k: tuple(control.xyz[k])))
+        if np.abs(control.xyz[a, :2] - control.xyz[b, :2]).max() <= SAME_PLAN_M
+        and abs(control.xyz[a, 2] - control.xyz[b, 2]) > SAME_PLAN_M
+    ]  # fmt: skip
+    return [
+        f"control points {listed(block.points[control.point[[a, b]]])} have the same X and Y and heights "
+        f"{abs(control.xyz[a, 2] - control.xyz[b, 2]):.3g} m apart: is one point there twice?"
+        for a, b in pairs[:MOST_SHOWN]
+    ]
+
+
+def _zero_heights(block: Block) -> list[str]:
+    heights = block.control.xyz[:, 2]
+    heights = heights[np.isfinite(heights)]
+    if len(heights) < FEWEST_OF_ZERO or (heights != 0.0).any():
+        return []
+    return [
+        f"the heights of all {counted(len(heights), 'control point')} are 0: were they surveyed? If not, leave Z "
+        "empty, or give its σ as large as the ground is rough"
+    ]
