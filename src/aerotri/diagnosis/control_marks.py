@@ -98,6 +98,7 @@ def marks_of(block: Block, centre: np.ndarray, rotation: np.ndarray) -> Marks:
 
     Parameters
     ----------
+    block : its cameras hold the values that belong to the orientation.
     centre : (n, 3) m; rotation : (n, 3, 3) camera → object; NaN for photographs without orientation.
     """
     block, off = with_edits(block)
@@ -119,6 +120,18 @@ def marks_of(block: Block, centre: np.ndarray, rotation: np.ndarray) -> Marks:
     return Marks(xyz, _sigma(rays, of, xyz), tuple(found))
 
 
+def rays_that_tell(block: Block) -> np.ndarray:
+    """Rows of the image points that `marks_of` needs: those of control and check points, and a sample of others."""
+    points = block.image_points.point
+    return np.flatnonzero(np.isin(points, block.control.point) | np.isin(points, _sample(block, points)))
+
+
+def _sample(block: Block, points: np.ndarray) -> np.ndarray:
+    """(p,) some of the points that are no control, in their order."""
+    others = np.setdiff1d(points, block.control.point)
+    return others[np.unique(np.linspace(0, len(others) - 1, SAMPLE).astype(np.int64))] if len(others) else others
+
+
 def _rays(block: Block, centre: np.ndarray, rotation: np.ndarray, rows: np.ndarray, usual: float) -> _Rays:
     """Of image points (r,); `usual` is the miss of other points, rad."""
     points = block.image_points
@@ -133,9 +146,7 @@ def _rays(block: Block, centre: np.ndarray, rotation: np.ndarray, rows: np.ndarr
 
 def _usual_miss(block: Block, centre: np.ndarray, rotation: np.ndarray, seen: np.ndarray) -> float:
     """rad, the median miss of a sample of the points that are no control; 0 without any."""
-    points = np.setdiff1d(block.image_points.point[seen], block.control.point)
-    if len(points) > SAMPLE:
-        points = points[np.linspace(0, len(points) - 1, SAMPLE).astype(np.int64)]
+    points = _sample(block, block.image_points.point[seen])
     rows = seen[np.isin(block.image_points.point[seen], points)]
     rays = _rays(block, centre, rotation, rows, 0.0)
     of = np.searchsorted(points, block.image_points.point[rows])

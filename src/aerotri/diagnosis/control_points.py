@@ -21,13 +21,13 @@ MOST_SHOWN = 5
 """Pairs of points that are named [C]: more is a system, not a slip."""
 
 
-def doubts_before_adjustment(block: Block, centre: np.ndarray, rotation: np.ndarray) -> tuple[str, ...]:
-    """Sentences about control points: from start values, coordinates and marks.
+def doubts_with_orientation(block: Block, centre: np.ndarray, rotation: np.ndarray) -> tuple[str, ...]:
+    """As `doubts_of_control`, with those about marks that do not meet.
 
     Parameters
     ----------
     block : as it is given, not in a local frame: heights of 0 are 0 there. centre : (n, 3) m; rotation : (n, 3, 3)
-        camera → object, start values in a frame with three like axes; NaN for photographs without.
+        camera → object, in a frame with three like axes; NaN for photographs without.
     """
     found = marks_of(block, centre, rotation).contradictions
     return (*(one.sentence(block) for one in found), *doubts_of_control(block))

@@ -14,6 +14,7 @@ from aerotri.functional_model.additional_parameters import AUTO
 from aerotri.observations import Block
 from aerotri.pipeline.choosing import ParameterChoice, choose_again, choose_parameters, with_reason
 from aerotri.pipeline.components import with_variance_components
+from aerotri.pipeline.control_doubts import doubts_at_start, with_control_doubts
 from aerotri.pipeline.in_frame import adjust_in_frame
 from aerotri.pipeline.local import Report
 from aerotri.pipeline.model_part import with_model_part
@@ -108,6 +109,7 @@ def _adjusted(
     found = judged(with_relative(with_model_part(found)))
     if tested and asks_for_test(block):
         found = with_shutter_test(found, report)
+    found = with_control_doubts(found, block)
     return found if choice is None else with_reason(found, choice)
 
 
@@ -152,11 +154,13 @@ def adjust_and_explain(
 
         return causes(_as_chosen(given, found), found, again, geoid)
 
+    block = given
     try:
         found = _from_start(with_start(given, geoid, say), report, None, geoid, True, sets)
     except AdjustmentFailedError as error:
         o = error.outcome
-        raise AdjustmentFailedError(replace(o, reasons=(*explained(None), *o.reasons))) from error
+        reasons = (*explained(None), *o.reasons, *doubts_at_start(block, geoid))
+        raise AdjustmentFailedError(replace(o, reasons=reasons)) from error
     except NoStartValuesError as error:
         reasons = explained(None)
         if not reasons:

@@ -144,7 +144,7 @@ def check(block: Block | FilePath, *, control_prefix: str = "", geoid: FilePath 
         block = _read(Path(block))
     metric, note = in_metres(with_control_prefix(block, control_prefix), geoid)
     found, tried = inventory(metric), rehearse(metric, geoid)
-    said = suspicions(metric, found, UNITS[angle_unit])
+    said = (*suspicions(metric, found, UNITS[angle_unit]), *tried.doubts)
     warnings = (*said, *(text for text in tried.warnings if not _is_said(text, said)))
     notes = (*((note,) if note else ()), *unread)
     return BlockCheck(metric, found, angle_unit, image_unit, tried.missing, warnings, notes, folder)

@@ -12,7 +12,7 @@ import numpy as np
 from aerotri.adjustment.parallel import thread_count
 from aerotri.conventions import InputError, mm_from_px
 from aerotri.coordinates.blocks import transform_block
-from aerotri.diagnosis.control_points import doubts_before_adjustment
+from aerotri.diagnosis.control_points import doubts_with_orientation
 from aerotri.execution.work import Workplace
 from aerotri.formats.assembly import assemble
 from aerotri.formats.assembly.parts import PositionList, Reading, no_sigma
@@ -126,7 +126,7 @@ def tie_photographs(
     frame = oriented.frame
     placed_block = in_frame(reading.block, frame)
     found = reproject(*placed_block)
-    about_control = doubts_before_adjustment(*placed_block)
+    about_control = doubts_with_orientation(*placed_block)
     local = reading.block if frame is None else transform_block(reading.block, frame)
     offset_px, unsettled = adjusted_offsets(local, found.points, found.offset_px)
     block, sigma_px = with_sigma_of_ties(reading.block, offset_px, len(tracks))
