@@ -137,6 +137,69 @@ def test_control_can_be_marked(files, tied):
     assert "://" not in page
 
 
+def with_changed_list(files, tied, tmp_path, change):
+    """The photographs tied again with what was found, on a list whose rows (words) are changed."""
+    lines = (files[0] / "gcp_list.txt").read_text().splitlines()
+    rows = change([line.split() for line in lines[1:]])
+    (tmp_path / "gcp_list.txt").write_text("\n".join([lines[0], *(" ".join(row) for row in rows)]) + "\n")
+    shutil.copytree(tied / "tie_point_cache", tmp_path / "out" / "tie_point_cache")
+    given = options(files, gcp=str(tmp_path / "gcp_list.txt"))
+    code = run_tiepoints(files[0] / "photographs", tmp_path / "out", given, False)
+    return code, json.loads((tmp_path / "out" / "tiepoints.json").read_text())
+
+
+def control_of(rows, files):
+    """Names of the control points that are no check points and have three marks, in their order."""
+    names = [row[6] for row in rows]
+    return [name for name in dict.fromkeys(names) if name not in files[1] and names.count(name) > 2]
+
+
+def test_a_wrong_point_and_a_wrong_mark_are_named(files, tied, tmp_path, capsys):
+    """One point typed 80 m off, one mark at another detail: the others place the block where it was."""
+    wrong = {}
+
+    def change(rows):
+        names = control_of(rows, files)
+        wrong["point"], wrong["mark"] = names[0], names[1]
+        mark = next(row for row in rows if row[6] == names[1])
+        mark[3], wrong["image"] = str(float(mark[3]) + 60.0), mark[5]
+        return [[str(float(row[0]) + 80.0), *row[1:]] if row[6] == names[0] else row for row in rows]
+
+    code, content = with_changed_list(files, tied, tmp_path, change)
+    assert code == 0
+    placement = content["placement"]
+    points = {point["name"]: point for point in placement["points"]}
+    assert placement["fits"]
+    assert [name for name, point in points.items() if not point["used"]] == [wrong["point"]]
+    assert abs(points[wrong["point"]]["offset_m"][0] + 80.0) < 2.0
+    assert points[wrong["point"]]["misfit_sigma"] > 4.0
+    said = " ".join(content["doubts"])
+    assert f"not used to place the block: {wrong['point']} (8" in said
+    assert f"control point {wrong['mark']}: its mark in {wrong['image'].removesuffix('.tif')}" in said
+    assert set(content["doubts"]) <= set(content["messages"])
+    told = capsys.readouterr().out
+    assert re.search(rf"^{wrong['point']} .*σ  no: more than 4 σ$", told, re.MULTILINE)
+    one, other = (read_block(folder).images.centre for folder in (tied, tmp_path / "out"))
+    assert np.abs(one - other).max() < 1.0
+
+
+def test_a_list_that_does_not_belong_has_no_place(files, tied, tmp_path, capsys):
+    """Names exchanged all round: said first, exit code 1, and the block is there to be looked at."""
+
+    def change(rows):
+        names = [name for name in dict.fromkeys(row[6] for row in rows) if name not in files[1]]
+        place = {name: next(row[:3] for row in rows if row[6] == name) for name in names}
+        after = dict(zip(names, np.random.default_rng(1).permutation(names).tolist(), strict=True))
+        return [[*place[after[row[6]]], *row[3:]] if row[6] in after else row for row in rows]
+
+    code, content = with_changed_list(files, tied, tmp_path, change)
+    assert code == 1
+    assert not content["placement"]["fits"]
+    assert content["placement"]["problem"] == content["doubts"][0]
+    assert "no place that can be trusted" in capsys.readouterr().err
+    assert len(read_block(tmp_path / "out").images) == 6
+
+
 def test_points_without_marks_are_predicted_only(files, tied, tmp_path):
     """A list of coordinates: nothing holds the block but what else there is, and the pieces are there to mark in."""
     block = read_block(tied)

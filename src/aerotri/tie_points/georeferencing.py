@@ -2,9 +2,9 @@
 most of them agree on.
 
 [L] Umeyama's closed form on triples; of these the one with the least M-estimate of sample consensus (MSAC, Torr and
-Zisserman 2000), its points adjusted by least squares again and again (locally optimised, Chum et al. 2003). The scale
-of the misfits is the σ that is stated, never one that the misfits themselves give. What the first orientation errs by
-is the one thing about it that is not known: it is found by maximum likelihood, [C] from a sequence of bends.
+Zisserman 2000), the points that agree with it adjusted by least squares again and again. The scale of the misfits is
+the σ that is stated, never one that the misfits themselves give. What the first orientation errs by is the one thing
+about it that is not known: it is found by maximum likelihood, [C] from a sequence of bends.
 """
 
 from __future__ import annotations
