@@ -9,7 +9,7 @@ import pytest
 
 import aerotri
 from aerotri.diagnosis.control_points import doubts_of_control
-from aerotri.observations import Edits
+from aerotri.observations.block import Edits
 from ten_photographs import ten_photographs
 
 

@@ -6,7 +6,7 @@ the coordinates of the point are.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -20,9 +20,10 @@ from aerotri.observations import Block, ImagePoints
 LEAST_MISS_PX = 5.0
 """Miss of a mark from which it is doubted [C]: a mark is set to a pixel or two, also by hand."""
 USUAL_MISSES = 10.0
-"""The same in misses of other points [C]: start values and lenses that are not adjusted yet move all rays."""
-SAMPLE = 2000
-"""Points of which the usual miss is taken [C]: their median is known to some per cent."""
+"""The same in usual misses of other points, of the photograph or of all [C]: start values and lenses that are not
+adjusted yet move all rays, and a photograph that is oriented wrongly its own; that is not the fault of a mark."""
+SAMPLE = 20000
+"""Points of which the usual misses are taken [C]: enough for every photograph that has marks."""
 MOST_DOUBTED = 50
 """Points that are looked at one by one [C]: where more are wrong, it is not their marks."""
 
@@ -93,6 +94,19 @@ class _Rays:
         return _Rays(*(a[rows] for a in (self.image, self.centre, self.direction, self.view, self.allowed)))
 
 
+def contradictions_in_words(block: Block, found: Sequence[Contradiction]) -> tuple[str, ...]:
+    """A sentence for every contradiction; one for those of a photograph that contradicts at several points."""
+    several = {one.wrong for one in found if one.wrong >= 0 and sum(other.wrong == one.wrong for other in found) > 1}
+    said = [one.sentence(block) for one in found if one.wrong not in several]
+    for image in sorted(several):
+        names = listed(block.points[[one.point for one in found if one.wrong == image]])
+        said.append(
+            f"control points {names}: their marks in {block.images.names[image]} do not meet those in other "
+            "photographs: look at its orientation, and whether the marks are of another photograph"
+        )
+    return tuple(said)
+
+
 def marks_of(block: Block, centre: np.ndarray, rotation: np.ndarray) -> Marks:
     """Intersect the marks of control and check points and hold the rays of each against one another.
 
@@ -107,7 +121,7 @@ def marks_of(block: Block, centre: np.ndarray, rotation: np.ndarray) -> Marks:
     row[block.control.point] = np.arange(count)
     seen = ~off & np.isfinite(centre[block.image_points.image, 0])
     rows = np.flatnonzero(seen & (row[block.image_points.point] >= 0))
-    rays = _rays(block, centre, rotation, rows, _usual_miss(block, centre, rotation, np.flatnonzero(seen)))
+    rays = _rays(block, centre, rotation, rows, _usual_misses(block, centre, rotation, np.flatnonzero(seen)))
     of = row[block.image_points.point[rows]]
     xyz = intersect(count, of, rays.centre, rays.direction, rays.allowed)
     bad = _misses(rays, xyz[of]) > rays.allowed
@@ -123,36 +137,51 @@ def marks_of(block: Block, centre: np.ndarray, rotation: np.ndarray) -> Marks:
 def rays_that_tell(block: Block) -> np.ndarray:
     """Rows of the image points that `marks_of` needs: those of control and check points, and a sample of others."""
     points = block.image_points.point
-    return np.flatnonzero(np.isin(points, block.control.point) | np.isin(points, _sample(block, points)))
+    chosen = _sample(block, np.arange(len(points)))
+    return np.flatnonzero(np.isin(points, block.control.point) | np.isin(points, chosen))
 
 
-def _sample(block: Block, points: np.ndarray) -> np.ndarray:
-    """(p,) some of the points that are no control, in their order."""
-    others = np.setdiff1d(points, block.control.point)
+def _sample(block: Block, rows: np.ndarray) -> np.ndarray:
+    """(p,) some of the points that are no control, of photographs with marks, in their order."""
+    image, point = block.image_points.image[rows], block.image_points.point[rows]
+    marked = np.unique(image[np.isin(point, block.control.point)])
+    others = np.setdiff1d(point[np.isin(image, marked)], block.control.point)
     return others[np.unique(np.linspace(0, len(others) - 1, SAMPLE).astype(np.int64))] if len(others) else others
 
 
-def _rays(block: Block, centre: np.ndarray, rotation: np.ndarray, rows: np.ndarray, usual: float) -> _Rays:
-    """Of image points (r,); `usual` is the miss of other points, rad."""
+def _rays(block: Block, centre: np.ndarray, rotation: np.ndarray, rows: np.ndarray, usual: np.ndarray) -> _Rays:
+    """Of image points (r,); `usual` (n,) are the misses of other points in every photograph, rad."""
     points = block.image_points
     some = ImagePoints(points.image[rows], points.point[rows], points.xy[rows], points.sigma[rows])
     tangent, image = directions_of(replace(block, image_points=some)).tangent, some.image
     ray = np.einsum("rij,rj->ri", rotation[image], np.column_stack([tangent, -np.ones(len(rows))]))
     ray /= np.linalg.norm(ray, axis=1, keepdims=True)
     pixel = np.array([camera.pixel_mm / camera.focal_length_mm for camera in block.cameras])
-    allowed = np.maximum(LEAST_MISS_PX * pixel[block.images.camera[image]], USUAL_MISSES * usual)
+    allowed = np.maximum(LEAST_MISS_PX * pixel[block.images.camera[image]], USUAL_MISSES * usual[image])
     return _Rays(image, centre[image], ray, -rotation[image][:, :, 2], allowed)
 
 
-def _usual_miss(block: Block, centre: np.ndarray, rotation: np.ndarray, seen: np.ndarray) -> float:
-    """rad, the median miss of a sample of the points that are no control; 0 without any."""
-    points = _sample(block, block.image_points.point[seen])
+def _usual_misses(block: Block, centre: np.ndarray, rotation: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """(n,) rad, median miss of the points that are no control, of all or of the photograph if that is larger.
+
+    Rays that have no point, as it would lie behind one of its cameras, miss by all that there is.
+    """
+    nothing = np.zeros(len(block.images))
+    points = _sample(block, seen)
     rows = seen[np.isin(block.image_points.point[seen], points)]
-    rays = _rays(block, centre, rotation, rows, 0.0)
+    rays = _rays(block, centre, rotation, rows, nothing)
     of = np.searchsorted(points, block.image_points.point[rows])
     miss = _misses(rays, intersect(len(points), of, rays.centre, rays.direction, rays.allowed)[of])
-    miss = miss[np.isfinite(miss)]
-    return float(np.median(miss)) if len(miss) else 0.0
+    known = np.bincount(of, minlength=len(points))[of] > 1
+    miss = np.nan_to_num(miss, nan=np.pi)
+    if not known.any():
+        return nothing
+    usual = np.full(len(block.images), float(np.median(miss[known])))
+    order = np.flatnonzero(known)[np.argsort(rays.image[known], kind="stable")]
+    image, first = np.unique(rays.image[order], return_index=True)
+    medians = [float(np.median(own)) for own in np.split(miss[order], first[1:])]
+    usual[image] = np.maximum(usual[image], medians)
+    return usual
 
 
 def _misses(rays: _Rays, xyz: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from aerotri.adjustment.prepare import with_edits
 from aerotri.conventions import counted
-from aerotri.diagnosis.control_marks import listed, marks_of
+from aerotri.diagnosis.control_marks import contradictions_in_words, listed, marks_of
 from aerotri.observations import Block
 
 SAME_PIXEL = 2.0
@@ -30,7 +30,7 @@ def doubts_with_orientation(block: Block, centre: np.ndarray, rotation: np.ndarr
         camera → object, in a frame with three like axes; NaN for photographs without.
     """
     found = marks_of(block, centre, rotation).contradictions
-    return (*(one.sentence(block) for one in found), *doubts_of_control(block))
+    return (*contradictions_in_words(block, found), *doubts_of_control(block))
 
 
 def doubts_of_control(block: Block) -> tuple[str, ...]:

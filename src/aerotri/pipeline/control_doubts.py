@@ -8,7 +8,7 @@ import numpy as np
 
 from aerotri.conventions import FilePath
 from aerotri.coordinates.blocks import frame_of_block, transform_block
-from aerotri.diagnosis.control_marks import marks_of, rays_that_tell
+from aerotri.diagnosis.control_marks import contradictions_in_words, marks_of, rays_that_tell
 from aerotri.diagnosis.control_points import doubts_of_control, doubts_with_orientation
 from aerotri.formats.assembly.oriented import oriented_from_adjusted
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -45,4 +45,4 @@ def _of_marks(local: AdjustedBlock) -> tuple[str, ...]:
     oriented = oriented_from_adjusted(replace(local, block=replace(block, image_points=some)))
     xy = some.xy if oriented.errors is None else some.xy - oriented.errors
     block = replace(oriented.block, image_points=replace(some, xy=xy))
-    return tuple(one.sentence(block) for one in marks_of(block, oriented.centre, oriented.rotation).contradictions)
+    return contradictions_in_words(block, marks_of(block, oriented.centre, oriented.rotation).contradictions)
