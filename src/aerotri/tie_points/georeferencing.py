@@ -9,7 +9,7 @@ about it that is not known: it is found by maximum likelihood, [C] from a sequen
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -23,6 +23,8 @@ COLLINEAR = 0.03
 TRIPLES = 1000
 """Triples of points that are tried; chosen [C]: with half of the points wrong one in eight is right, so that 1000 hold
 more than a hundred right ones."""
+SOUGHT_WITH = 500
+"""Points that the place is sought with where there are more, evenly from end to end [C]; all of them improve it."""
 KEPT = 10
 """Triples that are improved by least squares; chosen [C]: the best one by itself may be of three points near to one
 another, which its neighbours in cost are not."""
@@ -99,6 +101,15 @@ class _Pairs:
     sigma: np.ndarray
     looking: np.ndarray | None
 
+    def some(self) -> _Pairs:
+        """Those that the place is sought with, where there are very many."""
+        rows = np.unique(np.linspace(0, len(self.source) - 1, SOUGHT_WITH).astype(np.int64))
+        return replace(self, source=self.source[rows], target=self.target[rows], sigma=self.sigma[rows])
+
+    def bent(self, bend_m: float) -> _Pairs:
+        """With what the first orientation errs by in their σ."""
+        return replace(self, sigma=np.hypot(self.sigma, bend_m))
+
 
 @dataclass(frozen=True, eq=False)
 class _Similarities:
@@ -146,13 +157,13 @@ def place(
     order = np.lexsort(source.T)
     down = None if looking is None else looking / np.linalg.norm(looking)
     pairs = _Pairs(source[order], target[order], sigma[order], down)
-    tried, extent = _of_triples(pairs, seed), _extent(target)
-    found = [_consensus(pairs, tried, bend * extent) for bend in BENDS]
-    best = int(np.argmin([surprise for _, surprise in found]))
-    placed, back = found[best][0], np.argsort(order)
+    some, extent = pairs.some(), _extent(target)
+    bend, placed = _likeliest(some, _of_triples(some, seed), extent)
+    pairs = pairs.bent(bend * extent)
+    placed, back = _improved(pairs, placed)[0], np.argsort(order)
     return Placement(
         float(placed.scale[0]), placed.rotation[0], placed.translation[0], placed.offsets(pairs)[0][back],
-        np.hypot(sigma, BENDS[best] * extent), BENDS[best],
+        pairs.sigma[back], bend,
     )  # fmt: skip
 
 
@@ -213,17 +224,29 @@ def _looking_down(found: _Similarities, target: np.ndarray, narrow: np.ndarray, 
     return _Similarities(found.scale, rotation, translation)
 
 
-def _consensus(pairs: _Pairs, tried: _Similarities, bend_m: float) -> tuple[_Similarities, float]:
-    """The best similarity (1,) where the first orientation errs by so much, and −2 log of its likelihood.
+def _likeliest(pairs: _Pairs, tried: _Similarities, extent: float) -> tuple[float, _Similarities]:
+    """The bend with which the points are most likely, and the similarity (1,) then; `extent` is theirs, m."""
+    best, least = (BENDS[0], tried.take(np.zeros(1, np.int64))), np.inf
+    for bend in BENDS:
+        bent = pairs.bent(bend * extent)
+        placed, surprise = _consensus(bent, tried)
+        if surprise < least:
+            best, least = (bend, placed), surprise
+        elif (_squares(bent, placed)[0] < AGREES**2).all():
+            # where all agree and a larger bend makes them less likely, it goes on like that
+            break
+    return best
+
+
+def _consensus(pairs: _Pairs, tried: _Similarities) -> tuple[_Similarities, float]:
+    """The best similarity (1,) of those tried, improved, and −2 log of its likelihood.
 
     A point that does not agree lies anywhere within the extent of the points. The seven unknowns take so many
     coordinates of those that agree, as in a restricted likelihood [L: Patterson and Thompson 1971]: three points that
     agree by chance do not count for more than five that agree less well.
     """
-    pairs = _Pairs(pairs.source, pairs.target, np.hypot(pairs.sigma, bend_m), pairs.looking)
-    cost = _costs(pairs, tried)
-    begun = np.argsort(cost, kind="stable")[:KEPT]
-    ends = [_improved(pairs, tried.take(begun[k : k + 1]), float(cost[begun[k]])) for k in range(len(begun))]
+    begun = np.argsort(_costs(pairs, tried), kind="stable")[:KEPT]
+    ends = [_improved(pairs, tried.take(begun[k : k + 1])) for k in range(len(begun))]
     best, _ = min(ends, key=lambda end: end[1])
     square = _squares(pairs, best)[0]
     agrees = square < AGREES**2
@@ -249,11 +272,12 @@ def _view(pairs: _Pairs, tried: _Similarities) -> np.ndarray:
     return (tried.rotation @ pairs.looking - [0.0, 0.0, -1.0]) / LOOKING
 
 
-def _improved(pairs: _Pairs, at: _Similarities, cost: float) -> tuple[_Similarities, float]:
-    """By least squares of the points that agree, as long as the cost falls: it ends no worse than it began.
+def _improved(pairs: _Pairs, at: _Similarities) -> tuple[_Similarities, float]:
+    """By least squares of the points that agree, as long as the cost falls, and the cost: no worse than it began.
 
     The exact solution of the points that agree cannot raise the cost (majorisation [L: Hunter and Lange 2004]).
     """
+    cost = float(_costs(pairs, at)[0])
     for _ in range(STEPS):
         after = _step(pairs, at, _squares(pairs, at)[0] < AGREES**2)
         lower = float(_costs(pairs, after)[0])
