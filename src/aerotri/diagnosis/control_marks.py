@@ -71,7 +71,7 @@ class Marks:
     Parameters
     ----------
     xyz : (k, 3) m of every row of control, NaN where fewer than two rays meet under a real angle, or contradict.
-    sigma : (k,) m, along the weakest direction, of marks as good as the other points of the block.
+    sigma : (k,) m, along the weakest direction, by the σ of the marks and the usual miss of other points.
     contradictions : of points whose marks do not meet.
     """
 
@@ -82,16 +82,18 @@ class Marks:
 
 @dataclass(frozen=True, eq=False)
 class _Rays:
-    """Rays (r,) of marks: photographs, centres (r, 3), unit directions (r, 3), views (r, 3), and the miss allowed."""
+    """Rays (r,) of marks: photographs, centres (r, 3), unit directions (r, 3), views (r, 3), the miss allowed and σ."""
 
     image: np.ndarray
     centre: np.ndarray
     direction: np.ndarray
     view: np.ndarray
     allowed: np.ndarray
+    sigma: np.ndarray
 
     def take(self, rows: np.ndarray) -> _Rays:
-        return _Rays(*(a[rows] for a in (self.image, self.centre, self.direction, self.view, self.allowed)))
+        columns = (self.image, self.centre, self.direction, self.view, self.allowed, self.sigma)
+        return _Rays(*(column[rows] for column in columns))
 
 
 def contradictions_in_words(block: Block, found: Sequence[Contradiction]) -> tuple[str, ...]:
@@ -158,7 +160,9 @@ def _rays(block: Block, centre: np.ndarray, rotation: np.ndarray, rows: np.ndarr
     ray /= np.linalg.norm(ray, axis=1, keepdims=True)
     pixel = np.array([camera.pixel_mm / camera.focal_length_mm for camera in block.cameras])
     allowed = np.maximum(LEAST_MISS_PX * pixel[block.images.camera[image]], USUAL_MISSES * usual[image])
-    return _Rays(image, centre[image], ray, -rotation[image][:, :, 2], allowed)
+    focal = np.array([camera.focal_length_mm for camera in block.cameras])[block.images.camera[image]]
+    sigma = np.hypot(some.sigma.max(axis=1) / focal, usual[image])
+    return _Rays(image, centre[image], ray, -rotation[image][:, :, 2], allowed, sigma)
 
 
 def _usual_misses(block: Block, centre: np.ndarray, rotation: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -235,12 +239,12 @@ def _gap(rays: _Rays, i: int, j: int) -> float:
 
 
 def _sigma(rays: _Rays, of: np.ndarray, xyz: np.ndarray) -> np.ndarray:
-    """(k,) m of points (k, 3), for rays that err by a third of what is allowed; NaN without a point."""
+    """(k,) m of points (k, 3) along their weakest direction; NaN without a point."""
     distance = np.linalg.norm(xyz[of] - rays.centre, axis=1)
     across = np.eye(3) - rays.direction[:, :, None] * rays.direction[:, None, :]
     sigma, normal = np.full(len(xyz), np.nan), np.zeros((len(xyz), 3, 3))
     known = np.isfinite(distance)
-    weight = 1.0 / np.square(rays.allowed[known] * distance[known] / 3.0)
+    weight = 1.0 / np.square(np.maximum(rays.sigma[known] * distance[known], 1e-300))
     np.add.at(normal, of[known], across[known] * weight[:, None, None])
     there = np.isfinite(xyz[:, 0])
     sigma[there] = 1.0 / np.sqrt(np.maximum(np.linalg.eigvalsh(normal[there])[:, 0], 1e-300))
