@@ -154,12 +154,13 @@ def adjust_and_explain(
 
         return causes(_as_chosen(given, found), found, again, geoid)
 
-    block = given
+    started = Started(given)
     try:
-        found = _from_start(with_start(given, geoid, say), report, None, geoid, True, sets)
+        started = with_start(given, geoid, say)
+        found = _from_start(started, report, None, geoid, True, sets)
     except AdjustmentFailedError as error:
         o = error.outcome
-        reasons = (*explained(None), *o.reasons, *doubts_at_start(block, geoid))
+        reasons = (*explained(None), *o.reasons, *doubts_at_start(started.block, geoid))
         raise AdjustmentFailedError(replace(o, reasons=reasons)) from error
     except NoStartValuesError as error:
         reasons = explained(None)
