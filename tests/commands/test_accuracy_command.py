@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import aerotri
 from aerotri.cli.app import invoke
+from aerotri.report.pages.adjustment import report_html
 from small_blocks import small_block
 
 
@@ -112,3 +114,18 @@ def test_refused_input(adjusted, tmp_path):
             aerotri.accuracy(adjusted, **words)
     with pytest.raises(aerotri.InputError, match="holds no adjustment"):
         invoke(["accuracy", str(tmp_path), "--out", str(tmp_path / "a")])
+
+
+def test_rmse_h_is_one_number_on_every_page(adjusted):
+    """Screen, report and statement have that of the standard, with the survey error; the fit has other names."""
+    found = aerotri.accuracy(adjusted)
+    line = re.search(
+        r"check points: RMS .*; RMSE_H ([\d.]+), RMSE_V ([\d.]+) m with the survey error", adjusted.summary()
+    )
+    assert line is not None
+    assert [float(number) for number in line.groups()] == pytest.approx([found.rmse_h, found.rmse_v], abs=6e-4)
+    page = report_html(adjusted.adjusted, {})
+    assert f"<b>{line[1]} / {line[2]} m</b>" in page
+    assert page.count("RMSE_H, survey error included") == 1
+    assert f"RMSE_H {100.0 * found.rmse_h:.2f} cm" in found.summary()
+    assert not [text for text in adjusted.findings["quantity"] if "RMSE" in text]

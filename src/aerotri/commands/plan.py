@@ -35,8 +35,8 @@ def plan_lines(c: dict[str, Any]) -> list[str]:
         f"GSD {100.0 * f['gsd_m'][0]:.2f} to {100.0 * f['gsd_m'][1]:.2f} cm; overlap at least "
         f"{100.0 * f['forward_overlap']:.0f} % forward, {100.0 * f['side_overlap']:.0f} % sideways; every place in "
         f"{f['least_rays']} photographs or more",
-        f"expected: RMSE_H {a['rmse_h_m']:.3f} m, RMSE_V {a['rmse_v_m']:.3f} m; σ of Z on 95 % of the area at most "
-        f"{a['sigma_z_95_m']:.3f} m; σ of the volume {a['sigma_volume_m3']:.3g} m³",
+        f"expected error: in plan {a['rmse_h_m']:.3f} m, in height {a['rmse_v_m']:.3f} m; σ of Z on 95 % of the area "
+        f"at most {a['sigma_z_95_m']:.3f} m; σ of the volume {a['sigma_volume_m3']:.3g} m³",
         f"{len(c['control'])} control points",
     ]
     if c["target"] is not None:

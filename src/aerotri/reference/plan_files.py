@@ -7,7 +7,7 @@ from aerotri.reference.records import DescribedFile, Item, within
 
 PLACE = "folder of plan"
 KINDS = {
-    "asprs": "RMSE_H and RMSE_V over the area.",
+    "asprs": "RMS of the errors in plan and in height over the area.",
     "sigma-z": "σ of Z on 95 % of the area.",
     "sigma-volume": "σ of the volume over the area.",
 }
@@ -15,8 +15,14 @@ ACCURACY = within(
     "accuracy",
     Item("ground_points", "whole", "Ground points over the area."),
     Item("cell_m", "number", "Their distance, the cell of sigma_z.tif.", "m"),
-    Item("rmse_h_m", "number", "RMSE_H to be expected over the area.", "m"),
-    Item("rmse_v_m", "number", "RMSE_V to be expected over the area.", "m"),
+    Item(
+        "rmse_h_m",
+        "number",
+        "RMS of the errors in plan to be expected over the area; the RMSE_H of a test has the "
+        "error of its check points besides.",
+        "m",
+    ),
+    Item("rmse_v_m", "number", "The same in height.", "m"),
     Item("sigma_z_median_m", "number", "σ of Z, median of the ground points.", "m"),
     Item("sigma_z_95_m", "number", "σ of Z that 95 % of the ground points keep.", "m"),
     Item("sigma_z_largest_m", "number", "Largest σ of Z.", "m"),

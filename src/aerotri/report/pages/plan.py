@@ -17,7 +17,11 @@ from aerotri.results.head import Head
 SIZE, MARGIN, CLASSES = 1000.0, 0.04, 6
 """Width of the map in its own units, its margin as a share, and the greys of σ."""
 GREYS = ("#f7f7f7", "#dcdcdc", "#bdbdbd", "#969696", "#737373", "#525252")
-KINDS = {"asprs": "RMSE_H and RMSE_V", "sigma-z": "σ of Z on 95 % of the area", "sigma-volume": "σ of the volume"}
+KINDS = {
+    "asprs": "errors in plan and in height (RMS)",
+    "sigma-z": "σ of Z on 95 % of the area",
+    "sigma-volume": "σ of the volume",
+}
 
 
 @dataclass(frozen=True)
