@@ -1,14 +1,19 @@
 """How long a step along a known direction is taken, on functions of one unknown."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from aerotri.adjustment.damping import Damping
+from aerotri.adjustment.normal_equations import RightSide
+from aerotri.adjustment.prepare import prepare
+from aerotri.adjustment.robust import LEAST_SQUARES
 from aerotri.adjustment.secants import Secants
 from aerotri.adjustment.steps import Place, Trial, lengthened, until_better
 from aerotri.adjustment.unknowns import Step
+from small_blocks import small_block
 
 
 class Valley:
@@ -20,7 +25,7 @@ class Valley:
 
     def assemble(self, state, damping, estimator):
         right = np.array([-0.5 * self.slope(state)])
-        return SimpleNamespace(cost=self.cost(state), right=right, point_decrement=0.0)
+        return RightSide(right, self.cost(state), 0.0, np.zeros((0, 2)), np.zeros(0), -1, right, 0.0)
 
     def settle_points(self, state, estimator):
         return state
@@ -80,3 +85,36 @@ def test_step_that_nothing_shortens_is_damped():
     found, damping = until_better(valley, at, step, Damping(), Secants())
     assert found is None
     assert damping.value > 0.0
+
+
+@pytest.mark.parametrize("cost", [np.inf, np.nan])
+def test_step_to_what_is_no_number_is_none(cost):
+    valley = Valley(lambda x: cost if x < 0.5 else 1.0 + x**2, lambda x: 2.0 * x)
+    at, step = tried(valley, 1.0, -1.0)
+    assert not step.improves(at.equations)
+    assert not step.place.is_below(at)
+
+
+def test_step_to_equations_that_overflow_is_none():
+    """The cost is a number, and lower, but nothing could be solved there."""
+    valley = Valley(lambda x: x**2, lambda x: np.inf if x < 0.5 else 2.0 * x)
+    at, step = tried(valley, 1.0, -1.0)
+    assert not step.improves(at.equations)
+
+
+def test_step_beyond_all_places_is_none():
+    prepared = prepare(small_block(4)[0])
+    system, state = prepared.system, prepared.state
+    size = 6 * len(state.centre) + len(state.shared)
+    near, far = np.zeros(size), np.zeros(size)
+    near[0], far[0] = 1.0, 1e40
+    assert system.whole_step(state, near, 0.0, LEAST_SQUARES) is not None
+    assert system.whole_step(state, far, 0.0, LEAST_SQUARES) is None
+
+
+def test_growth_by_rounding_is_none():
+    """Of a function whose minimum is 0, where every place differs from it by rounding."""
+    valley = Valley(lambda x: 1e-22 * (1.0 + x), lambda x: 0.0)
+    at, step = tried(valley, 0.0, 1.0)
+    assert not step.improves(at.equations)
+    assert step.improves(replace(at.equations, rounding=1e-21))

@@ -107,3 +107,15 @@ def test_areas_divide_all_photographs_in_any_order():
     turned = replace(block, images=replace(block.images, centre=block.images.centre))
     again = areas(turned, images[::-1], centre[::-1], 4)
     assert {frozenset(a.tolist()) for a in found} == {frozenset(a.tolist()) for a in again}
+
+
+def test_a_group_without_a_common_point_says_nothing():
+    block = with_adjustment(
+        small_block(3, **(TINY | {"control": CONTROL}))[0], additional_parameters=parse_parameters("bluh:9+3")
+    )
+    found = adjust_keeping_system(block)
+    u = found.system.unknowns
+    factor = found.system.factorise(found.solution.equations)
+    said = predict_groups(found.system, found.solution, factor, status_of(found), [u.images[:1], u.images[:4]], 1.0)
+    assert np.isnan(said.deviance[0])
+    assert np.isfinite(said.deviance[1])

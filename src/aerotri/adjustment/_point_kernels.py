@@ -20,6 +20,10 @@ MIN_PIVOT = 1e-14
 """Share of a diagonal element of a point's 3 × 3 below which its pivot is taken for rounding [C]: doubles carry 2e-16;
 a larger limit would refuse points of very narrow rays, which `weak_geometry` judges by their σ."""
 
+FARTHEST = 1e30
+"""Coordinate, m, and size of a step beyond which nothing is gone to [C]: farther than anything that can be
+photographed, and so near that squares and fourth powers of it, and of their inverse, are still numbers."""
+
 
 @kernel
 def scratch(max_rays, max_columns, n_shared):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.adjustment._point_kernels import linearise_point, point_normals, solve_transposed
+from aerotri.adjustment._point_kernels import FARTHEST, linearise_point, point_normals, solve_transposed
 from aerotri.adjustment.kernel_records import Elimination
 from aerotri.compiled import kernel
 
@@ -48,13 +48,15 @@ def settle_points(first, last, problem, rounds, limit, work):
                 if not square * left * left > limit:
                     break
             solve_transposed(lower, d)
+            within = True
             for a in range(3):
                 old[a] = xyz[p, a]
                 xyz[p, a] += d[a]
+                within = within and abs(xyz[p, a]) < FARTHEST
             after, _ = linearise_point(p, rays, table, values, points, weighting, work)
             for a in range(3):
                 after += prior_weight[p, a] * (prior_xyz[p, a] - xyz[p, a]) ** 2
-            if after < before or (led and after == before):
+            if within and (after < before or (led and after == before)):
                 ends = not led and before - after < LITTLE * before
                 before, last_square = after, square if damping == 0.0 else np.inf
                 damping = 0.0 if led and damping <= LEAST_DAMPING else 0.1 * damping

@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.robust import Estimator
+from aerotri.adjustment.robust import Estimator, normalised_lengths, scale_of
 from aerotri.adjustment.solve import INTERRUPTED, Solution, SolveOptions, minimise
 from aerotri.adjustment.unknowns import State
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS
@@ -30,10 +30,13 @@ MOST_STEPS = 8
 """Steps of m = ideal + d(m) at most [C]: each shrinks the error by the slope of d, a few hundredths, rarely two
 tenths."""
 SETTLED, STANDING = 1e-4, 1e-3
-"""Change of the positions (root mean square, in σ of an image coordinate) below which one of these steps is the last,
+"""Change of the positions (root mean square, in units of the residuals) below which one of these steps is the last,
 and below which the adjustment need not follow [C]: what is left of the bias is in proportion."""
 GROSS = 50.0
-"""Residual in σ from which a ray keeps its measured position [C]: a blunder has no adjusted one worth the name."""
+"""Residual in units of the residuals from which a ray keeps its measured position [C]: a blunder has no adjusted one
+worth the name."""
+LEAST_UNIT = 1e-6
+"""Unit of the residuals, in stated σ, at least [C]: below, positions move by rounding."""
 BROWN = np.array([name.startswith("brown.") for name in INTERIOR_COLUMNS])
 
 
@@ -63,11 +66,19 @@ def at_adjusted_positions(system: NormalSystem, state: State, estimator: Estimat
     system = _evaluated_at(system, rays.xy)
     for _ in range(MOST_STEPS):
         residual = system.right_side(state, estimator).residual
-        gross = np.any(np.abs(residual * rays.inv_sigma) > GROSS, axis=1, keepdims=True)
+        unit = unit_of_residuals(system, residual, estimator)
+        gross = np.any(np.abs(residual * rays.inv_sigma) > GROSS * unit, axis=1, keepdims=True)
         before, system = system, _evaluated_at(system, np.where(gross, rays.xy, rays.xy - residual))
-        if positions_moved(before, system) < SETTLED:
+        if positions_moved(before, system) < SETTLED * unit:
             break
     return system
+
+
+def unit_of_residuals(system: NormalSystem, residual: np.ndarray, estimator: Estimator) -> float:
+    """Size of most residuals (m, 2) mm in stated σ, however far these are from true; gross errors do not count."""
+    if estimator.is_robust:
+        return max(estimator.scale, LEAST_UNIT)
+    return max(scale_of(normalised_lengths(residual, system.unknowns.rays.inv_sigma), 1.0), LEAST_UNIT)
 
 
 def minimise_at_adjusted(
@@ -90,7 +101,8 @@ def minimise_at_adjusted(
             break
         there = at_adjusted_positions(system, solution.state, solution.estimator)
         change = max(positions_moved(system, there), _moved_by_velocity(system, there, solution.state))
-        if round_ == MOST_ROUNDS - 1 or change < STANDING:
+        unit = unit_of_residuals(system, solution.equations.residual, solution.estimator)
+        if round_ == MOST_ROUNDS - 1 or change < STANDING * unit:
             equations = there.assemble(solution.state, 0.0, solution.estimator)
             return there, replace(solution, equations=equations)
         again = minimise(there, solution.state, redundancy, options.after(solution.iterations))

@@ -45,10 +45,11 @@ def follow(system: NormalSystem, first: Trial, redundancy: int, most: int, say: 
         move = system.whole_step(state, x, 0.0, LEAST_SQUARES) if contraction <= SLOWEST_CONTRACTION else None
         if move is None:
             break
-        settled = is_negligible(next_decrement * SLOWEST_CONTRACTION, side.cost, redundancy)
+        settled = is_negligible(next_decrement * SLOWEST_CONTRACTION, side.cost, redundancy, side.rounding)
         there = system.unknowns.advance(state, move)
         side = system.assemble(there, 0.0, LEAST_SQUARES) if settled else system.right_side(there, LEAST_SQUARES)
-        if not side.cost <= (costs[-1] if costs else first.equations.cost) * (1.0 + COST_TOLERANCE):
+        last = costs[-1] if costs else first.equations.cost
+        if not (side.are_numbers and side.cost <= last * (1.0 + COST_TOLERANCE) + side.rounding):
             settled = False
             break
         state, decrement = there, next_decrement

@@ -21,6 +21,8 @@ AT_INFINITY = 100.0
 """Distance from the middle of the points, in usual distances, from which a point is as good as at infinity."""
 BEYOND_ALL_MEASURE = 1e6
 """The same of the farthest point of a block that ran away, and of columns beside those of a usual photograph."""
+WRONG_START = "the start values are too far off for any equations:"
+"""Begins the sentence on a block whose equations say nothing where they start."""
 SHOWN = 6
 """Names listed in one sentence."""
 
@@ -55,10 +57,26 @@ def checked_factor(
     if _has_run_away(state, equations) and (plain := _factor(system, equations)) is not None:
         # no measure holds over so many powers of ten; the verdict says what such a result is worth
         return plain, []
-    free = free_directions(system, state, equations, estimator, motions.directions)
+    try:
+        free = free_directions(system, state, equations, estimator, motions.directions)
+    except NotPositiveDefiniteError:
+        return None, [without_digits(system, equations)]
     sentences = _named(system, equations, motions, free)
     factor = None if sentences else _factor(system, equations)
     return factor, sentences if factor or sentences else ["the normal equations are singular"]
+
+
+def without_digits(system: NormalSystem, equations: NormalEquations) -> str:
+    """A sentence on equations that lost all their digits, with the image point that is farthest off."""
+    u, length = system.unknowns, system.residual_lengths(equations)
+    if not len(length):
+        return "there are no image points to adjust"
+    ray = int(np.argmax(np.where(np.isnan(length), np.inf, length)))
+    point, image = u.block.image_points.point[u.rays.source[ray]], u.images[u.rays.image[ray]]
+    return (
+        f"{WRONG_START} point {u.block.points[point]} stands beside photograph {u.block.images.names[image]} or in it, "
+        "not before it. Check the orientations of this photograph and of the others that the point is measured in"
+    )
 
 
 def _factor(system: NormalSystem, equations: NormalEquations) -> Factor | None:

@@ -36,6 +36,10 @@ from aerotri.observations import Block, Settings
 
 T = TypeVar("T")
 
+ROUNDED = 2e-15
+"""Relative error of a predicted image coordinate by rounding: some ten units in the last place [C]; the prediction of a
+ray has about as many operations."""
+
 
 @dataclass(frozen=True, eq=False)
 class RightSide:
@@ -49,6 +53,7 @@ class RightSide:
     residual : (m, 2) mm, measured − predicted, in ray order; weight : (m,) robust factors.
     undetermined : row of a point that its rays do not determine, −1 if there is none.
     of_photographs : (6·n + s,) the right side before photographs follow others on a rigid rig.
+    rounding : what the cost, and the decrement of a step, are uncertain by since numbers have sixteen digits.
     """
 
     right: np.ndarray
@@ -58,6 +63,12 @@ class RightSide:
     weight: np.ndarray
     undetermined: int
     of_photographs: np.ndarray
+    rounding: float
+
+    @property
+    def are_numbers(self) -> bool:
+        """Whether a step can be had from them: nothing in them overflowed."""
+        return bool(np.isfinite(self.cost) and np.isfinite(self.point_decrement) and np.isfinite(self.right).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +85,12 @@ class NormalEquations(RightSide):
     matrix: BorderedMatrix
     diagonal: np.ndarray
     chain: Chain | None = None
+
+    @property
+    def are_numbers(self) -> bool:
+        """As of the right side; with the matrix."""
+        parts = self.matrix.blocks, self.matrix.border, self.matrix.corner, self.diagonal
+        return super().are_numbers and all(bool(np.isfinite(part).all()) for part in parts)
 
 
 class NormalSystem:
@@ -110,6 +127,7 @@ class NormalSystem:
         self.priors = SharedPriors.of(unknowns)
         # the kernels see no prior of a point that is not eliminated: it stands with the shared parameters
         self._point_prior = np.where((unknowns.kept < 0)[:, None], unknowns.prior_weight, 0.0)
+        self._rounding: float | None = None
 
     @property
     def chunks(self) -> list[tuple[int, int]]:
@@ -226,7 +244,23 @@ class NormalSystem:
             weight=problem.weighting.weight,
             undetermined=max(o[2] for o in outcomes),
             of_photographs=whole,
+            rounding=self._rounded(state),
         )
+
+    def _rounded(self, state: State) -> float:
+        """Sum of the squares of what rounding does to the whitened residuals, at the first state that is asked for.
+
+        A predicted image coordinate is as uncertain as the coordinates that it is computed from, seen from the
+        photograph: c·(|X| + |X0|)/|X − X0| units in the last place, and those of its own.
+        """
+        if self._rounding is None:
+            rays, c = self.unknowns.rays, self.unknowns.interior(state)[:, 0]
+            point, centre = np.repeat(state.points, np.diff(rays.start), axis=0), state.centre[rays.image]
+            far = np.linalg.norm(point, axis=1) + np.linalg.norm(centre, axis=1)
+            seen = 1.0 + far / np.maximum(np.linalg.norm(point - centre, axis=1), 1.0)
+            error = ROUNDED * np.abs(c)[rays.lens_row] * seen
+            self._rounding = float(np.sum(np.square(error[:, None] * rays.inv_sigma)))
+        return self._rounding
 
     def whitened_rows(self, state: State) -> list[Rows]:
         """The observations beside the image points, linearised at `state` and divided by σ, in the unknowns' axes."""
@@ -311,15 +345,19 @@ class NormalSystem:
         return Step(images, shared, points)
 
     def whole_step(self, state: State, x: np.ndarray, damping: float, estimator: Estimator) -> Step | None:
-        """The step of all unknowns from the solution x (6·n + s,) of the reduced equations; None if not a number.
+        """The step of all unknowns from the solution x (6·n + s,) of the reduced equations; None where it leads beyond
+        all numbers.
 
         Of a free block without the motion of the whole.
         """
+        if not _is_within_reach(x):
+            return None
         step, u = self.back_substitute(state, x, damping, estimator), self.unknowns
+        if not _is_within_reach(step.points):
+            return None
         if u.block.settings.adjustment.is_free and u.motions.count:
             step = without_motion(u, state, step)
-        finite = all(np.isfinite(part).all() for part in (step.images, step.shared, step.points))
-        return step if finite else None
+        return step
 
     def residual_lengths(self, equations: RightSide) -> np.ndarray:
         """(m,) lengths of the residuals of the rays, each coordinate divided by its a-priori σ."""
@@ -394,3 +432,8 @@ class NormalSystem:
         if self._reduction is None or equations.chain is None:
             return equations.matrix.blocks[: len(self.unknowns.images)].copy()
         return self._reduction.reduced(equations.matrix, equations.chain).blocks[: len(self._reduction.leads)]
+
+
+def _is_within_reach(step: np.ndarray) -> bool:
+    """Whether a step is made of numbers, none of them beyond `FARTHEST`."""
+    return bool((np.abs(step) < _point_kernels.FARTHEST).all())

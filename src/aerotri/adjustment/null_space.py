@@ -63,6 +63,11 @@ def free_directions(
     Parameters
     ----------
     also : (size, ·) directions to be measured whatever the factor says of them.
+
+    Raises
+    ------
+    NotPositiveDefiniteError
+        Where the points' elimination left no digit of the matrix.
     """
     length = np.sqrt(equations.diagonal)
     factor = _regularised(system, equations)

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri import of_known
 from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.ray_status import ray_status
+from aerotri.adjustment.ray_status import RayStatus, ray_status
 from aerotri.adjustment.rig_start import rig_start_values
 from aerotri.adjustment.robust import STAGES
 from aerotri.adjustment.scanning import motions_in_words
 from aerotri.adjustment.shared_parameters import cameras_of_groups, group_of_images
-from aerotri.adjustment.system import build_system
+from aerotri.adjustment.system import build_system, nothing_to_adjust
 from aerotri.adjustment.unknowns import (
     ORIENTATION_ELEMENTS,
     StartValues,
@@ -62,6 +63,8 @@ def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
             file="images.csv",
         )
     status, warnings = ray_status(block, start, off)
+    if not (status == RayStatus.USED).any():
+        raise nothing_to_adjust("; ".join(warnings) or "there are none")
     measured = _freed_of_the_air(block, start)
     system, state = build_system(measured, start, status)
     lonely = partnerless_in_words(block) if block.settings.adjustment.datum == "control" else ()
@@ -100,7 +103,7 @@ def _freed_of_the_air(block: Block, start: StartValues) -> Block:
     """The block with image points corrected for refraction and earth curvature, as its settings ask."""
     if block.settings.refraction == "off" and block.settings.earth_curvature == "off":
         return block
-    ground = float(np.nanmedian(start.points[:, 2])) + start.origin[2]
+    ground = of_known.median(start.points[:, 2]) + start.origin[2]
     xy = corrected_image_points(block, start.rotation, start.centre + start.origin, ground)
     return replace(block, image_points=replace(block.image_points, xy=xy))
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from aerotri.adjustment.chord_steps import follow
 from aerotri.adjustment.damping import Damping
-from aerotri.adjustment.defects import checked_factor, is_suspect
+from aerotri.adjustment.defects import checked_factor, is_suspect, without_digits
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.panels import DOUBLE, SINGLE
 from aerotri.adjustment.parallel import blas_threads
@@ -92,7 +92,7 @@ class Solution:
     ----------
     status : 'converged', 'not converged', 'rank deficient', or 'interrupted' where `SolveOptions.inspect` wanted it.
     costs : Σρ at the start and after every iteration of the last stage.
-    defects : sentences naming what the observations leave free, when rank deficient.
+    defects : sentences naming what the observations leave free, when rank deficient, or why nothing can be computed.
     step_tolerance : share of σ within which a robust adjustment converged.
     """
 
@@ -173,6 +173,8 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
     """Gauss-Newton with the estimator of one stage."""
     at = _reweighted(system, place_at(system, state, LEAST_SQUARES), stage.name, redundancy)
     course = _Course(stage.done, options.report, redundancy, [at.equations.cost])
+    if not at.equations.are_numbers:
+        return replace(course.ended("not converged", at), defects=(without_digits(system, at.equations),))
     last_iteration, precision = stage.done + options.max_iterations, first_precision(system, stage.is_robust)
     damping, secants, scale_changes, last_decrement = Damping(), None, 0, np.inf
     while course.iteration < last_iteration:

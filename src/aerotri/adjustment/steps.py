@@ -52,6 +52,10 @@ class Visited:
     equations: RightSide
     estimator: Estimator
 
+    def is_below(self, other: Visited) -> bool:
+        """Whether its cost is the lower one, and a step can be had from it."""
+        return self.equations.are_numbers and self.equations.cost < other.equations.cost
+
 
 @dataclass(frozen=True, eq=False)
 class Place(Visited):
@@ -90,16 +94,21 @@ class Trial:
 
     def improves(self, before: RightSide) -> bool:
         """Whether the cost is no higher; at the minimum it stands still within rounding."""
-        return bool(np.isfinite(self.equations.cost)) and self.equations.cost <= before.cost * (1.0 + COST_TOLERANCE)
+        return self.equations.are_numbers and self.equations.cost <= before.cost + _rounding(before)
 
     def keeps_promise(self, before: RightSide) -> bool:
         """Whether it gains at least a share of what photographs and shared parameters promised, within rounding."""
         gain, promised = before.cost - self.equations.cost, float(self.reduced @ before.right)
-        return self.improves(before) and gain >= LEAST_GAIN * promised - COST_TOLERANCE * before.cost
+        return self.improves(before) and gain >= LEAST_GAIN * promised - _rounding(before)
 
     def gain_ratio(self, before: RightSide) -> float:
         """The gain over the gain promised, 1 at most."""
         return min((before.cost - self.equations.cost) / max(self.decrement, 1e-300), 1.0)
+
+
+def _rounding(before: RightSide) -> float:
+    """Growth of the cost that is none."""
+    return COST_TOLERANCE * before.cost + before.rounding
 
 
 def take_step(
@@ -143,7 +152,7 @@ def stretched(system: NormalSystem, at: Place, step: Trial, last_decrement: floa
     factor = min(1.0 / (1.0 - ratio), LONGEST_STRETCH)
     move = Step(factor * step.move.images, factor * step.move.shared, factor * step.move.points)
     there = place_at(system, system.unknowns.advance(at.state, move), at.estimator)
-    return replace(step, place=there) if there.equations.cost < step.equations.cost else step
+    return replace(step, place=there) if there.is_below(step.place) else step
 
 
 def lengthened(system: NormalSystem, at: Place, step: Trial) -> Trial:
@@ -157,7 +166,7 @@ def lengthened(system: NormalSystem, at: Place, step: Trial) -> Trial:
         if float(step.reduced @ step.equations.right) <= STEEP * slope:
             break
         further = _at_share(system, at, step, 2.0)
-        if not further.equations.cost < step.equations.cost:
+        if not further.place.is_below(step.place):
             break
         step, slope = further, 2.0 * slope
     return step
@@ -219,7 +228,7 @@ def _shortened(system: NormalSystem, at: Place, step: Trial) -> Trial | None:
         least = share * share * slope / bend if np.isfinite(bend) and bend > 0.0 else 0.0
         share = float(np.clip(least, SHORTEST * share, 0.5 * share))
         step = _at_share(system, at, whole, share)
-        if at.equations.cost - step.equations.cost >= LEAST_GAIN * share * slope:
+        if step.equations.are_numbers and at.equations.cost - step.equations.cost >= LEAST_GAIN * share * slope:
             return step
     return None
 

@@ -47,14 +47,25 @@ def is_settled(at: Place, step: Trial, redundancy: int, robust_tolerance: float 
     """
     if robust_tolerance is not None:
         variance = max(step.equations.cost, 1e-30) / max(redundancy, 1)
-        still = abs(at.equations.cost - step.equations.cost) <= ROBUST_COST_TOLERANCE * at.equations.cost
-        return still and step.decrement - at.equations.point_decrement <= robust_tolerance**2 * variance
+        rounding = at.equations.rounding
+        still = abs(at.equations.cost - step.equations.cost) <= ROBUST_COST_TOLERANCE * at.equations.cost + rounding
+        return still and step.decrement - at.equations.point_decrement <= robust_tolerance**2 * variance + rounding
     contraction = min(1.0, max(SURE_CONTRACTION, abs(step.decrement) / last_decrement))
     if not np.isfinite(last_decrement):
         contraction = 1.0
-    return is_negligible(abs(step.decrement) * contraction, step.equations.cost, redundancy)
+    equations = step.equations
+    return is_negligible(abs(step.decrement) * contraction, equations.cost, redundancy, equations.rounding)
 
 
-def is_negligible(decrement: float, cost: float, redundancy: int) -> bool:
-    """Whether a step of this decrement changes no unknown by STEP_TOLERANCE of its σ, or drowns in rounding."""
-    return decrement <= STEP_TOLERANCE**2 * max(cost, 1e-30) / max(redundancy, 1) or decrement <= ROUNDING * cost
+def is_negligible(decrement: float, cost: float, redundancy: int, rounding: float) -> bool:
+    """Whether a step of this decrement changes no unknown by STEP_TOLERANCE of its σ, or drowns in rounding.
+
+    σ is that of the residuals, whatever σ are stated: with stated ones that are far too large the residuals tell when
+    nothing changes any more. Without residuals it is 0, and rounding alone is left.
+
+    Parameters
+    ----------
+    rounding : what the cost is uncertain by, see `normal_equations.RightSide`.
+    """
+    in_sigma = STEP_TOLERANCE**2 * max(cost, 1e-30) / max(redundancy, 1)
+    return decrement <= in_sigma or decrement <= ROUNDING * cost + rounding

@@ -18,6 +18,7 @@ from aerotri.adjustment.unknowns import (
     hold_orientation,
     hold_points,
 )
+from aerotri.conventions import InputError
 from aerotri.observations import Block
 
 
@@ -32,13 +33,29 @@ def build_system(
     status : (m,) of the rays. held : (row of the block's points, axis) of coordinates held for a minimal or inner
         datum; chosen anew where None.
     last : photographs of the block that are eliminated last, see `sparse_cholesky.Symbolic`.
+
+    Raises
+    ------
+    InputError
+        Where no ray takes part.
     """
+    if not (status == RayStatus.USED).any():
+        raise nothing_to_adjust()
     unknowns, state = build_unknowns(block, start, status == RayStatus.USED)
     unknowns, extras = extra_observations(unknowns, state)
     state = replace(state, shared=np.array(unknowns.shared.start, dtype=float))
     unknowns = _with_datum(unknowns, state, extras, held)
     rows = None if last is None else np.flatnonzero(np.isin(unknowns.images, last))
     return NormalSystem(unknowns, extras, state.centre[:, :2], rows), state
+
+
+def nothing_to_adjust(why: str = "") -> InputError:
+    """The error of a block without a ray that takes part."""
+    return InputError(
+        "no image point can be adjusted" + (f": {why}" if why else ""),
+        "a point has to be measured in two photographs that have orientations, and its rays have to meet",
+        file="image_points.csv",
+    )
 
 
 def _with_datum(

@@ -86,7 +86,7 @@ class _Look:
             once more, within the whole block. Not on the way: far from the minimum too many would go.
         """
         scale = _scale(system, equations, estimator, self.redundancy)
-        self.points = np.flatnonzero(scale * system.looseness(state, estimator) > LOOSE)
+        self.points = _unless_all(np.flatnonzero(scale * system.looseness(state, estimator) > LOOSE), len(state.points))
         if not (photographs or (in_block and len(self.points))):
             return bool(len(self.points))
         inverse = _regularised_inverse(system, equations)
@@ -95,7 +95,8 @@ class _Look:
         if photographs:
             self.photographs = _loose_photographs(system, state, inverse, scale)
         if in_block and not len(self.photographs):
-            self.points = np.union1d(self.points, _loose_points(system, state, inverse, estimator, scale))
+            in_block_too = np.union1d(self.points, _loose_points(system, state, inverse, estimator, scale))
+            self.points = _unless_all(in_block_too, len(state.points))
         return bool(len(self.photographs) or len(self.points))
 
 
@@ -286,8 +287,13 @@ def _unit_products(unknowns: Unknowns, state: State, carrier: np.ndarray | None 
     reach = np.maximum(np.linalg.norm(state.points[point] - state.centre[rays.image], axis=1), 1e-300)
     nearness = np.bincount(image, 1.0 / reach, n) / np.maximum(np.bincount(image, minlength=n), 1)
     unit = np.ones((n, 6))
-    unit[:, :3] = nearness[:, None]
+    # a photograph without rays of its own, such as the first of a station, has no distance
+    unit[:, :3] = np.where(nearness > 0.0, nearness, 1.0)[:, None]
     return unit[:, :, None] * unit[:, None, :]
+
+
+def _unless_all(rows: np.ndarray, n: int) -> np.ndarray:
+    return rows if len(rows) < n else rows[:0]
 
 
 def _unless_many(rows: np.ndarray, n: int) -> np.ndarray:

@@ -88,9 +88,16 @@ def _summary(content: dict[str, Any]) -> list[str]:
         )
     for axis in ("dX", "dY", "dZ"):
         s = c[axis]
-        lines.append(f"{axis}  {s['min']:+.3f} … {s['max']:+.3f} m, mean {s['mean']:+.3f}, RMS {s['rms']:.3f}")
+        known = s["rms"] is not None
+        size = (
+            f"{s['min']:+.3f} … {s['max']:+.3f} m, mean {s['mean']:+.3f}, RMS {s['rms']:.3f}" if known else "not known"
+        )
+        lines.append(f"{axis}  {size}")
     s = c["sigma_dZ"]
-    lines.append(f"σ of dZ  {s['min']:.4f} … {s['max']:.4f} m, mean {s['mean']:.4f}: {c['sigma_includes']}")
+    if s["mean"] is None:
+        lines.append("σ of dZ  not known: the block has no redundancy")
+    else:
+        lines.append(f"σ of dZ  {s['min']:.4f} … {s['max']:.4f} m, mean {s['mean']:.4f}: {c['sigma_includes']}")
     if "seams" in c and c["seams"]["count"]:
         seams = c["seams"]
         lines.append(f"steps between neighbouring models: RMS {seams['rms']:.3f} m at {seams['count']} seams; worst:")

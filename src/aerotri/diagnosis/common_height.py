@@ -45,7 +45,8 @@ class CommonHeight:
 
 
 def common_height(system: NormalSystem, solution: Solution, factor: Factor, sigma0: float) -> CommonHeight | None:
-    """The shared uncertainty of the heights; None in a minimal or inner datum, where it has no meaning.
+    """The shared uncertainty of the heights; None in a minimal or inner datum, where it has no meaning, and where all
+    heights are held.
 
     One solution with the factor: the mean height is a linear function of the unknowns.
     """
@@ -55,7 +56,11 @@ def common_height(system: NormalSystem, solution: Solution, factor: Factor, sigm
     sides = np.zeros((len(u.points), 3, 1))
     sides[:, 2] = 1.0 / len(u.points)
     _, shared, points = solve_sides(system, solution.state, factor, sides, solution.estimator)
-    sigma = float(np.sqrt(np.mean(points[:, 2, 0])))
+    variance_of_mean = float(np.mean(points[:, 2, 0]))
+    if not variance_of_mean > 0.0:
+        # all heights are held
+        return None
+    sigma = float(np.sqrt(variance_of_mean))
     focal = [k for k, name in enumerate(u.shared.names) if name == "focal_length_mm"]
     if not focal:
         return CommonHeight(sigma0 * sigma, "", np.nan, 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerotri import of_known
 from aerotri.conventions import counted
 from aerotri.diagnosis.finding import Finding, critical_of_worst, doubt, graded, times
 from aerotri.observations import Camera
@@ -56,7 +57,7 @@ def of_gnss(adjusted: AdjustedBlock) -> list[Finding]:
         return []
     axis = np.array(["XYZ".index(str(p.names[k])[-1]) for k in own])
     reach = np.array([_reach(adjusted) if ".drift_" in str(p.names[k]) else 1.0 for k in own])
-    observed = np.nanmedian(given.sigma, axis=0)[axis]
+    observed = of_known.medians(given.sigma)[axis]
     amount = p.value[own] * reach
     size = np.abs(amount) / np.hypot(observed, p.sigma[own] * reach)
     worst, critical = int(np.argmax(np.nan_to_num(size))), max(SHIFTED, critical_of_worst(len(own)))

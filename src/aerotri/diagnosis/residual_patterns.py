@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerotri import of_known
 from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.diagnosis import changes
 from aerotri.diagnosis.angle_conventions import convention_between
@@ -170,8 +171,8 @@ def of_offsets(evidence: Evidence) -> Iterator[Hypothesis]:
     if found.placed is None:
         return
     residual, tolerance = found.residual["gnss"], found.tolerance["gnss"]
-    middle = np.nanmedian(residual, axis=0)
-    scatter = SIGMA_PER_MAD * np.nanmedian(np.abs(residual - middle), axis=0)
+    middle = of_known.medians(residual)
+    scatter = SIGMA_PER_MAD * of_known.medians(np.abs(residual - middle))
     beyond = np.abs(middle) > np.maximum(3.0 * scatter, 0.5 * tolerance)
     offset = np.where(beyond & np.isfinite(middle), middle, 0.0)
     if not offset.any():

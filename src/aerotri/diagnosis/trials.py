@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri import of_known
 from aerotri.conventions import InputError
 from aerotri.diagnosis.finding import GRADES
 from aerotri.diagnosis.hypothesis import Hypothesis
@@ -57,7 +58,7 @@ FAILED = Trial("", np.inf, np.inf, 0.0)
 def trial_of(result: AdjustedBlock) -> Trial:
     """How an adjusted block fits."""
     w = result.check.w
-    check = float(np.sqrt(np.nanmean(w**2))) if np.isfinite(w).any() else 0.0
+    check = of_known.rms(w) if np.isfinite(w).any() else 0.0
     sigma0 = result.outcome.sigma0 if np.isfinite(result.outcome.sigma0) else np.inf
     level = result.outcome.verdict or judge(result).level
     own = result.parameters.names == "focal_length_mm"
@@ -71,7 +72,7 @@ def try_adjusting(block: Block, adjust: Adjust) -> Trial:
     """The trial of a block, whatever becomes of it."""
     try:
         return trial_of(adjust(block))
-    except (AdjustmentFailedError, InputError, np.linalg.LinAlgError, ValueError):
+    except (AdjustmentFailedError, InputError):
         return FAILED
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri import of_known
 from aerotri.diagnosis.ties import Ties, intersection_angles, photograph_ties
 from aerotri.diagnosis.work_items import KINDS, WorkItem, residual_items
 from aerotri.results.adjusted_block import AdjustedBlock
@@ -137,9 +138,9 @@ def _photographs(adjusted: AdjustedBlock, ties: Ties, limits: WorkLimits) -> lis
         "residuals": (_residual_sizes(adjusted), limits.residual_ratio),
     }
     ratios = {
-        name: (size / np.nanmedian(size), limit)
+        name: (size / of_known.median(size), limit)
         for name, (size, limit) in sizes.items()
-        if np.isfinite(size).any() and np.nanmedian(size) > 0.0
+        if of_known.median(size) > 0.0
     }
     items = []
     for image in np.flatnonzero(adjusted.images.rays > 0):

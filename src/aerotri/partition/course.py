@@ -55,6 +55,7 @@ class Place:
     Parameters
     ----------
     cost : Σρ of all observations. decrement : of what the parts eliminated; of_points : of the points among it.
+    rounding : what the cost is uncertain by.
     is_bare : whether there are no equations: where a step that changes nothing led.
     """
 
@@ -62,6 +63,7 @@ class Place:
     cost: float
     decrement: float
     of_points: float
+    rounding: float = 0.0
     is_bare: bool = False
 
 
@@ -180,11 +182,11 @@ class Course:
             solved = self.solved(damped)
             decrement = solved.decrement + damped.decrement
             # the equations at the end are taken with parameters at adjusted image points, not here
-            last = name == "off" and damping.value == 0.0 and self._is_negligible(decrement, last_decrement, place.cost)
+            last = name == "off" and damping.value == 0.0 and self._is_negligible(decrement, last_decrement, place)
             there = self._moved(damped, solved, last)
             if damped is not place:
                 self._drop(damped.at)
-            if there.cost <= place.cost * (1.0 + COST_TOLERANCE):
+            if there.cost <= place.cost * (1.0 + COST_TOLERANCE) + place.rounding:
                 self._drop(place.at)
                 self._drop_state(place.at)
                 ratio = min((place.cost - there.cost) / max(decrement, 1e-300), 1.0)
@@ -200,13 +202,13 @@ class Course:
         """As `stopping.is_settled` says it of a block in one piece."""
         if name != "off":
             variance = max(after.cost, 1e-30) / max(self.redundancy, 1)
-            still = abs(before.cost - after.cost) <= ROBUST_COST_TOLERANCE * before.cost
-            return still and decrement - before.of_points <= tolerance**2 * variance
-        return self._is_negligible(decrement, last_decrement, after.cost)
+            still = abs(before.cost - after.cost) <= ROBUST_COST_TOLERANCE * before.cost + before.rounding
+            return still and decrement - before.of_points <= tolerance**2 * variance + before.rounding
+        return self._is_negligible(decrement, last_decrement, after)
 
-    def _is_negligible(self, decrement: float, last_decrement: float, cost: float) -> bool:
+    def _is_negligible(self, decrement: float, last_decrement: float, at: Place) -> bool:
         contraction = min(1.0, max(1e-2, abs(decrement) / last_decrement)) if np.isfinite(last_decrement) else 1.0
-        return is_negligible(abs(decrement) * contraction, cost, self.redundancy)
+        return is_negligible(abs(decrement) * contraction, at.cost, self.redundancy, at.rounding)
 
     def _reduced(self, at: At) -> Place:
         """The equations of all parts there."""
@@ -225,7 +227,8 @@ class Course:
             refuse_fault(self.tasks, found)
         of_priors = self.common.cost_of_priors(at.shared)
         cost = sum(part.cost for part in found) + of_priors
-        return Place(at, cost, sum(part.decrement for part in found), sum(part.of_points for part in found))
+        decrement, of_points = sum(part.decrement for part in found), sum(part.of_points for part in found)
+        return Place(at, cost, decrement, of_points, sum(part.rounding for part in found))
 
     def _with_settled_points(self, place: Place) -> Place:
         """The place with all points at their minimum, where its estimator leaves some behind."""
@@ -251,7 +254,8 @@ class Course:
         return estimator_for(name, np.concatenate(lengths), self._share)
 
     def _evaluated(self, at: At) -> tuple[At, float]:
-        """Parameters evaluated at the adjusted image points, and how far these moved (root mean square, in σ)."""
+        """Parameters evaluated at the adjusted image points, and how far these moved (root mean square, in units of the
+        residuals)."""
         end = replace(at, positions=at.positions + 1, tag=self._next_tag())
         found = self.run(evaluate_part, Move(at, end))
         count = sum(number for _, number in found)

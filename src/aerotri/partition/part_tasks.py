@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.adjustment.adjusted_positions import at_adjusted_positions, positions_moved
+from aerotri.adjustment.adjusted_positions import at_adjusted_positions, positions_moved, unit_of_residuals
 from aerotri.adjustment.partial_factor import eliminate_inner, restored
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.settled_points import settled_points
@@ -110,12 +110,14 @@ class Reduced:
     Parameters
     ----------
     cost : Σρ. decrement : of what was eliminated; of_points : of the points among it.
+    rounding : what the cost is uncertain by, see `RightSide`.
     fault : why there are no equations, '' where there are.
     """
 
     cost: float
     decrement: float = 0.0
     of_points: float = 0.0
+    rounding: float = 0.0
     fault: str = ""
 
 
@@ -168,7 +170,8 @@ def move_part(move: Move, task: PartTask) -> Reduced:
     files.keep_state(there, move.end.state)
     if move.last:
         there = files.state(move.end.state, move.end.shared[task.shared])
-        return Reduced(part.system.right_side(there, move.end.estimator).cost)
+        side = part.system.right_side(there, move.end.estimator)
+        return Reduced(side.cost, rounding=side.rounding)
     return _reduced(part, move.end, task)
 
 
@@ -182,14 +185,16 @@ def settle_part(move: Move, task: PartTask) -> Reduced:
 
 
 def evaluate_part(move: Move, task: PartTask) -> tuple[float, int]:
-    """Parameters evaluated at the adjusted image points of a state; sum of the squared changes in σ, and how many."""
+    """Parameters evaluated at the adjusted image points of a state; sum of the squared changes in units of the
+    residuals, and how many."""
     files, at = task.files, move.start
     part = files.system(at.positions)
     state = files.state(at.state, at.shared[task.shared])
     there = at_adjusted_positions(part.system, state, at.estimator)
     files.keep_system(replace(part, system=there), move.end.positions)
     count = 2 * len(there.unknowns.rays.image)
-    return count * positions_moved(part.system, there) ** 2, count
+    unit = unit_of_residuals(there, there.right_side(state, at.estimator).residual, at.estimator)
+    return count * (positions_moved(part.system, there) / unit) ** 2, count
 
 
 def _reduced(part: PartSystem, at: At, task: PartTask) -> Reduced:
@@ -210,7 +215,7 @@ def _reduced(part: PartSystem, at: At, task: PartTask) -> Reduced:
     files.keep_left(Left(matrix, rest.right, diagonal), at.tag)
     files.keep_array(f"lengths_{at.tag}", system.residual_lengths(equations))
     of_points = equations.point_decrement
-    return Reduced(equations.cost, rest.decrement + of_points, of_points)
+    return Reduced(equations.cost, rest.decrement + of_points, of_points, equations.rounding)
 
 
 def refuse_fault(tasks: list[PartTask], found: list[Reduced]) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri import of_known
 from aerotri.adjustment.datum import FREEDOMS, nothing_holds, restore_datum
 from aerotri.adjustment.defects import checked_factor, point_without_rays_enough
 from aerotri.adjustment.normal_equations import NormalSystem
@@ -17,7 +18,7 @@ from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.weak_geometry import go_on_without, minimise_tied
 from aerotri.diagnosis.common_height import common_height
 from aerotri.diagnosis.common_shift import common_shift_in_words
-from aerotri.diagnosis.doubts import defects_in_words, doubts, failure, refuse_runaway
+from aerotri.diagnosis.doubts import defects_in_words, doubts, failure, refuse_runaway, too_good_in_words
 from aerotri.diagnosis.photograph_fields import photograph_fields_in_words
 from aerotri.diagnosis.position_errors import position_errors_in_words
 from aerotri.diagnosis.rigidity import movements_in_words, rigidity_in_words
@@ -217,10 +218,11 @@ def _with_words(delivered: _Delivered, timings: dict[str, float]) -> Adjustment:
     )  # fmt: skip
     timings = timings | {"statistics": time.perf_counter() - delivered.solved}
     tied = () if stand.deviations is None else (stand.deviations.sentence,)
-    said = (*result.outcome.warnings, *tied, *loose_in_words(result, kept), *inseparable(result.parameters))
+    said = (*result.outcome.warnings, *too_good_in_words(result), *tied, *loose_in_words(result, kept))
+    said += inseparable(result.parameters)
     shared_height = common_height(system, solution, delivered.factor, sigma0)
     if shared_height is not None:
-        sentence = shared_height.sentence(float(np.nanmedian(result.points.sigma[:, 2])))
+        sentence = shared_height.sentence(of_known.median(result.points.sigma[:, 2]))
         said += (sentence,) if sentence else ()
     found = common_shift_in_words(shift), position_errors_in_words(errors), photograph_fields_in_words(fields)
     said += tuple(words for words in found if words)
@@ -253,9 +255,10 @@ def _determined(found: tuple[Prepared, Solution]) -> tuple[Prepared, Solution]:
     """
     prepared, solution = found
     # where the principal distance ran away everything is undetermined, and names nothing of use
-    refuse_runaway(prepared.system, solution)
+    refuse_runaway(prepared.system, solution, prepared.state)
     if solution.defects:
-        raise failure(prepared.system, "rank deficient", defects_in_words(prepared.system, solution.defects))
+        status = solution.status if solution.status == "not converged" else "rank deficient"
+        raise failure(prepared.system, status, defects_in_words(prepared.system, solution.defects))
     return found
 
 

@@ -90,7 +90,8 @@ class Cofactors:
 def cofactors(system: NormalSystem, state: State, factor: Factor, estimator: Estimator) -> Cofactors:
     """All cofactors on the pattern of the normal matrix, and the redundancy numbers of the rays.
 
-    An inner datum is reached by the S-transformation; redundancy numbers do not depend on the datum.
+    An inner datum is reached by the S-transformation; redundancy numbers do not depend on the datum. Where rounding
+    took all digits, as in a block that ran away, cofactors are NaN: not known.
     """
     # threads of BLAS that wait for work would take a processor from the kernels
     with blas_threads(0.0):
@@ -99,8 +100,21 @@ def cofactors(system: NormalSystem, state: State, factor: Factor, estimator: Est
     images, border = _without_held(system.unknowns, inverse)
     result = Cofactors(images, inverse.corner, points, border, redundancy, inverse)
     if is_inner(system):
-        return transform_datum(result, inner_datum(system, state, factor, estimator))
-    return result
+        result = transform_datum(result, inner_datum(system, state, factor, estimator))
+    return replace(
+        result,
+        images=_with_digits(result.images),
+        shared=_with_digits(result.shared[None])[0],
+        points=_with_digits(result.points),
+    )
+
+
+def _with_digits(q: np.ndarray) -> np.ndarray:
+    """Cofactors (k, a, a), NaN in the rows and columns of variances that are none: a square is not negative."""
+    lost = ~(np.diagonal(q, axis1=1, axis2=2) >= 0.0)
+    if not lost.any():
+        return q
+    return np.where(lost[:, :, None] | lost[:, None, :], np.nan, q)
 
 
 def is_inner(system: NormalSystem) -> bool:
@@ -193,6 +207,7 @@ def total_correlations(q: np.ndarray) -> np.ndarray:
     """(s,) B_i = 1 − 1/(N_ii·Q_ii), N = Q⁻¹ the normals reduced to these parameters [L]."""
     if not len(q):
         return np.zeros(0)
-    sigma = np.sqrt(np.diagonal(q))
-    r = q / np.outer(sigma, sigma)
+    r = correlations(q)
+    if not np.isfinite(r).all():
+        return np.full(len(q), np.nan)
     return 1.0 - 1.0 / np.diagonal(np.linalg.inv(r))

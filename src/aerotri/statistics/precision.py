@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri import of_known
 from aerotri.quantiles import chi_square_quantile
 from aerotri.results.adjusted_block import AdjustedBlock, SharedParameters
 from aerotri.statistics.covariance import correlations
@@ -123,7 +124,7 @@ def _weakest(
     there = np.isfinite(sigma).any(axis=1)
     if not there.any():
         return ()
-    median = np.nanmedian(sigma[there], axis=0)
+    median = of_known.medians(sigma)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.nan_to_num(np.where(median > 0.0, sigma / median, 0.0))
     element = np.argmax(share, axis=1)

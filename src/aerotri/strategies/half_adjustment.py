@@ -230,8 +230,13 @@ def _with_conditions_left(block: Block, status: np.ndarray) -> Block:
 
 
 def of_largest_piece(block: Block, status: np.ndarray) -> np.ndarray:
-    """The status of rays with those outside the largest piece of photographs that points tie together set aside."""
+    """The status of rays with those outside the largest piece of photographs that points tie together set aside.
+
+    As it is where no ray is used.
+    """
     rays, used = block.image_points, status == RayStatus.USED
+    if not used.any():
+        return status
     incidence = coo_array(
         (np.ones(int(used.sum())), (rays.image[used], rays.point[used])), shape=(len(block.images), len(block.points))
     ).tocsr()

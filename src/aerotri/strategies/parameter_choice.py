@@ -136,11 +136,15 @@ def choose(comparison: ParameterComparison) -> Chosen:
     borne = replace(comparison, outcomes=tuple(there))
     behind = distances(borne)
     if not behind:
-        found = min(there, key=lambda o: o.bic)
+        found = min(there, key=lambda o: (np.nan_to_num(o.bic, nan=np.inf), o.effective))
         why = "the block is too small to predict one part by another: chosen by BIC alone"
+        if not np.isfinite(found.bic):
+            why = "the block has no redundancy that would tell one set from another: the one with fewest parameters"
         reason = f"additional parameters chosen: {found.name}; {why}"
     else:
-        alike = [o for o in there if o.name in behind and behind[o.name].alike]
+        judged = [o for o in there if o.name in behind]
+        # two sets of which one predicts nothing that the other does cannot be told apart
+        alike = [o for o in judged if behind[o.name].alike] or judged
         # without control no σ says which is the more cautious: the lens free, and little that could bend
         found = max(alike, key=lambda o: (np.nan_to_num(o.evidence.sigma_height), frees_the_lens(o), -o.effective))
         reason = _reason(found, alike, behind)
@@ -162,7 +166,7 @@ def _left_out(found: SetOutcome, comparison: ParameterComparison, far: dict[str,
 
 
 def _reason(found: SetOutcome, alike: Sequence[SetOutcome], behind: dict[str, Behind]) -> str:
-    count, points = len(found.evidence.areas), int(np.isfinite(found.evidence.control).sum())
+    count, points = len(_deviance(found.evidence.areas)), int(np.isfinite(found.evidence.control).sum())
     by = f"the image points of {count} areas of the block"
     if points:
         by += f" and {counted(points, 'control point')}"
@@ -196,7 +200,9 @@ def distances(comparison: ParameterComparison) -> dict[str, Behind]:
         return {}
     totals = [_between(o, there[0])[0] for o in there]
     best = there[int(np.nanargmin(totals))] if np.isfinite(totals).any() else there[0]
-    return {o.name: Behind(best.name, *_between(o, best), len(o.evidence.areas)) for o in there}
+    # an area whose photographs have no point in common predicts nothing, and is predicted by nothing
+    judged = {o.name: len(_deviance(o.evidence.areas - best.evidence.areas)) for o in there}
+    return {o.name: Behind(best.name, *_between(o, best), judged[o.name]) for o in there}
 
 
 def _between(outcome: SetOutcome, best: SetOutcome) -> tuple[float, float]:
@@ -226,9 +232,14 @@ def _deviance(values: np.ndarray) -> np.ndarray:
 
 
 def measure(difference: np.ndarray) -> float:
-    """Geometric mean, m, of the RMS in X, Y and Z of differences (k, 3)."""
-    with np.errstate(divide="ignore"):
-        return float(np.exp(np.mean(np.log(np.sqrt(np.nanmean(difference**2, axis=0))))))
+    """Geometric mean, m, of the RMS in X, Y and Z of differences (k, 3), over the coordinates that have any; NaN where
+    none has."""
+    known = np.isfinite(difference)
+    count = known.sum(axis=0)
+    if not count.any():
+        return float("nan")
+    square = np.sum(np.where(known, difference, 0.0) ** 2, axis=0)[count > 0] / count[count > 0]
+    return float(np.sqrt(np.prod(square ** (1.0 / len(square)))))
 
 
 def gain(outcome: SetOutcome, other: SetOutcome, differences: tuple[np.ndarray, np.ndarray]) -> Gain:
@@ -249,7 +260,8 @@ def reduction(own: np.ndarray, against: np.ndarray) -> tuple[float, float]:
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.exp(0.5 * np.mean(np.log(chosen @ own) - np.log(chosen @ against), axis=1))
         value = 1.0 - float(np.exp(0.5 * np.mean(np.log(own.sum(axis=0)) - np.log(against.sum(axis=0)))))
-    return value, float(np.nanstd(ratio))
+    ratio = ratio[np.isfinite(ratio)]
+    return value, float(np.std(ratio)) if len(ratio) else float("nan")
 
 
 def gains(comparison: ParameterComparison) -> dict[str, Gain]:

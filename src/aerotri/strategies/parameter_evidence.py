@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri import of_known
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
@@ -72,10 +73,6 @@ def evidence_of(
     with np.errstate(divide="ignore", invalid="ignore"):
         of_axes = np.square(predicted.sigma) + 1.0 / weight
         density = np.square(predicted.difference) / of_axes + np.log(of_axes)
-        height = float(np.sqrt(np.nanmean(np.square(predicted.sigma[:, 2])))) if _any(predicted.sigma) else np.nan
+        height = of_known.rms(predicted.sigma[:, 2])
     control = np.where(np.isfinite(density).any(axis=1), np.nansum(density, axis=1), np.nan)
     return Evidence(said[0], said[1], control, height)
-
-
-def _any(sigma: np.ndarray) -> bool:
-    return bool(np.isfinite(sigma[:, 2]).any()) if len(sigma) else False

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri import of_known
 from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
 from aerotri.adjustment.carry_over import start_values_at, with_shared
 from aerotri.adjustment.defects import checked_factor
@@ -66,7 +67,7 @@ def tested_shutter(found: Adjustment, options: SolveOptions) -> ShutterTest | No
     variants = (NONE, AFFINITY, ROLLING, BOTH)
     outcomes = {name: _adjusted(found, _as_variant(u.block, name), name, options) for name in variants}
     plain, rolling = outcomes[NONE], outcomes[ROLLING]
-    sigma = float(np.nanmedian(found.local.points.sigma[:, 2]))
+    sigma = of_known.median(found.local.points.sigma[:, 2])
     gain, error = _gain(rolling, plain)
     parameters = found.local.parameters
     own = parameters.names == READOUT

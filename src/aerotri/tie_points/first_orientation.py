@@ -292,7 +292,9 @@ def _common_points(
     """
     from scipy.sparse import csr_array
 
-    seen = csr_array((np.ones(len(point), np.int32), point, bounds))
+    # where there are no points the shape cannot be told from them
+    shape = len(bounds) - 1, int(point.max(initial=0)) + 1
+    seen = csr_array((np.ones(len(point), np.int32), point, bounds), shape=shape)
     both = (seen @ seen.T).tocoo()
     enough = (both.row < both.col) & (both.data >= FEWEST_POSE)
     first, second, count = both.row[enough], both.col[enough], both.data[enough]

@@ -36,6 +36,7 @@ from typing import Any
 
 import numpy as np
 
+from aerotri import of_known
 from aerotri.deformation.block_models import BlockDeformation, BlockModel, Seam
 from aerotri.deformation.dem_correction import DemOutcome
 from aerotri.deformation.dem_window import FIT_TOLERANCE_M, DemModels
@@ -67,7 +68,7 @@ def contour_interval(low: float, high: float) -> float:
 def deformation_json(deformation: Deformation, block: str) -> dict[str, Any]:
     """deform.json of one model."""
     d, g = deformation, deformation.geometry
-    low, high = float(np.nanmin(d.d[..., 2])), float(np.nanmax(d.d[..., 2]))
+    low, high = of_known.smallest(d.d[..., 2]), of_known.largest(d.d[..., 2])
     parallax = 1e3 * d.parallax
     return {
         "aerotri": __version__,
@@ -90,7 +91,10 @@ def deformation_json(deformation: Deformation, block: str) -> dict[str, Any]:
         "nodes": int(np.isfinite(d.d[..., 2]).sum()),
         **_components(d.d, d.sigma),
         "sigma_includes": sigma_in_words(d.variant, d.change),
-        "y_parallax_um": {"max": float(np.nanmax(parallax)), "rms": float(np.sqrt(np.nanmean(parallax**2)))},
+        "y_parallax_um": {
+            "max": number_or_none(of_known.largest(parallax)),
+            "rms": number_or_none(of_known.rms(parallax)),
+        },
         "contour_interval_m": contour_interval(low, high),
     }
 
@@ -98,7 +102,7 @@ def deformation_json(deformation: Deformation, block: str) -> dict[str, Any]:
 def block_deformation_json(deformation: BlockDeformation, block: str) -> dict[str, Any]:
     """deform.json of a block."""
     d = deformation
-    low, high = float(np.nanmin(d.d[..., 2])), float(np.nanmax(d.d[..., 2]))
+    low, high = of_known.smallest(d.d[..., 2]), of_known.largest(d.d[..., 2])
     return {
         "aerotri": __version__,
         "block": block,

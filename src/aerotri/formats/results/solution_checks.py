@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.adjustment._point_kernels import FARTHEST
 from aerotri.adjustment._robust_kernels import ADAPTIVE, ADAPTIVE_STEPS
 from aerotri.adjustment.ray_status import RAY_STATUS
 from aerotri.adjustment.robust import CODES, WIDEST
@@ -27,6 +28,9 @@ SQUARE = 1e-6
 LARGEST = 1e15
 """No value of an adjustment is larger, as in tables: numbers beyond lose their decimals, and squares of them
 overflow."""
+FARTHEST_POINT = 1e3 * FARTHEST
+"""Coordinate, m, of points that are as good as at infinity [C]: of a block with parallel rays the adjustment may have
+such, a step of `FARTHEST` at most at a time."""
 SCALARS = {"estimator_code": "iu", "estimator_limit": "f", "sigma0": "f", "iterations": "iu", "status": "U"} | {
     "geoid": "U", "components": "U", "removals": "U",
 }  # fmt: skip
@@ -137,7 +141,7 @@ def _is_bounded(values: np.ndarray) -> bool:
 def _whole_or_unknown(xyz: np.ndarray) -> bool:
     """Whether every row is finite, or NaN as a whole."""
     unknown = np.isnan(xyz).all(axis=1)
-    return _is_bounded(xyz[~unknown])
+    return bool((np.abs(xyz[~unknown]) <= FARTHEST_POINT).all())
 
 
 def _are_rotations(matrix: np.ndarray) -> bool:

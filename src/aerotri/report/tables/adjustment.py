@@ -26,6 +26,8 @@ LONGEST_CELL = 1000
 MOST_ROWS = 3000
 """Rows of a table of photographs at most; chosen [C]: a page with more opens slowly; all are in images.csv."""
 GNSS_UNITS = {"shift": "m", "drift": "m/s"}
+SMALL_SIGMA0 = 0.01
+"""Below which σ̂0 is written with its first digits: with three decimals it would be none."""
 MOST_REASONS = 6
 """Reasons that are listed with the verdict; chosen [C]: the first are the gravest, all are in adjustment.json."""
 
@@ -352,6 +354,15 @@ def what_to_do(outcome: Outcome) -> list[str]:
     ]
 
 
+def _sigma0_line(adjusted: AdjustedBlock) -> str:
+    o = adjusted.outcome
+    if not np.isfinite(o.sigma0):
+        return "sigma0 not known"
+    if o.sigma0 < SMALL_SIGMA0:
+        return f"sigma0 {o.sigma0:.2g} ({o.sigma0_um:.2g} µm)"
+    return f"sigma0 {o.sigma0:.3f} ({o.sigma0_um:.2f} µm{pixel_text(o.sigma0_um, adjusted)})"
+
+
 def summary_lines(adjusted: AdjustedBlock) -> list[str]:
     """The result in a few lines of plain text for a terminal; names may hold any printable character, also brackets."""
     o, p = adjusted.outcome, adjusted.parameters
@@ -361,7 +372,7 @@ def summary_lines(adjusted: AdjustedBlock) -> list[str]:
         *verdict_lines(o),
         f"{printable(adjusted.block.name)}: {o.status} after {counted(o.iterations, 'iteration')}"
         + (f": {o.message}" * bool(o.message)),
-        f"sigma0 {o.sigma0:.3f} ({o.sigma0_um:.2f} µm{pixel_text(o.sigma0_um, adjusted)})",
+        _sigma0_line(adjusted),
         f"redundancy {o.redundancy} = {o.observations} observations − {o.unknowns} unknowns"
         + (f" + {counted(o.conditions, 'condition')}" if o.conditions else ""),
         f"{counted(len(adjusted.block.images), 'photograph')}, {counted(len(adjusted.block.points), 'point')}, "
