@@ -49,7 +49,7 @@ class Entry:
     block : of `real_data`. lens : parameters that all programs have. robust : of ours, where pycolmap does
         not have to have the same.
     others : columns beside ours, from the data. colmap : whether pycolmap can be given it.
-    default : parameters of "default"; None where the block states its own.
+    default : parameters of "default"; None where the block states its own. default_held : leave points out of it too.
     """
 
     block: str
@@ -58,6 +58,7 @@ class Entry:
     others: Callable[[Path], list[Stated]] = lambda data: []
     colmap: bool = True
     default: str | None = "auto"
+    default_held: bool = True
     notes: tuple[str, ...] = ()
 
 
@@ -82,10 +83,10 @@ ENTRIES = {
     "cu_sbr_p1": Entry("cu_sbr_p1", robust="huber", others=of_pix4d("cu_sbr_p1"), notes=(
         "Pix4D had all ground points as control, ours and pycolmap the six of control_points.csv.",
         "aerotri lens and pycolmap by least squares, aerotri default with the robust estimator huber.")),
-    "ca502": Entry("ca502_rig", robust="huber", others=of_pix4d("ca502"), colmap=False, notes=(
+    "ca502": Entry("ca502_rig", robust="huber", others=of_pix4d("ca502"), colmap=False, default_held=False, notes=(
         "Pix4D had all ground points as control, ours the six of control_points.csv.",
         "Robust estimator huber.",)),
-    "share5": Entry("share5", robust="huber", others=of_pix4d("share5"), colmap=False, notes=(
+    "share5": Entry("share5", robust="huber", others=of_pix4d("share5"), colmap=False, default_held=False, notes=(
         "Pix4D had seven ground points as control, ours the four of control_points.csv.",
         "Robust estimator huber.",)),
 }  # fmt: skip
@@ -146,7 +147,7 @@ def found_of(name: str, data: Path, work: Path) -> Found:
         if isinstance(chosen, str):
             notes.append(f"aerotri default: {chosen}")
         else:
-            columns += columns_of("aerotri default", chosen, without_each(chosen))
+            columns += columns_of("aerotri default", chosen, without_each(chosen) if entry.default_held else [])
             families = chosen.block.settings.adjustment.additional_parameters
             notes.append(f"aerotri default: {', '.join(':'.join([f, '+'.join(i)]) for f, i in families) or 'none'}.")
     for other in entry.others(data):
