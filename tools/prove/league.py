@@ -21,9 +21,11 @@ import argparse
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 import aerotri
 import real_data
@@ -130,8 +132,8 @@ def peers_of(found: aerotri.Adjustment, others: Sequence[aerotri.Adjustment]) ->
     return [replace(colmap.stated(found.record.local), held=held), colmap.as_it_comes(found.record.local)]
 
 
-def found_of(name: str, data: Path, work: Path) -> Found:
-    """All columns of a block."""
+def found_of(name: str, data: Path, work: Path) -> Iterator[Found]:
+    """All columns of a block, after every program those that there are."""
     entry, notes, columns = ENTRIES[name], [*ENTRIES[name].notes], []
     folder = work / entry.block
     real_data.BLOCKS[entry.block](data, folder)
@@ -139,31 +141,40 @@ def found_of(name: str, data: Path, work: Path) -> Found:
     lens = block if entry.lens == "none" else with_lens_alone(block)
     base = adjusted(lens, entry.lens, "off" if entry.colmap else entry.robust)
     if isinstance(base, str):
-        return Found((), (f"aerotri lens: {base}",))
+        yield Found((), (f"aerotri lens: {base}",))
+        return
+    columns += columns_of("aerotri lens", base, [])
+    for other in entry.others(data):
+        points, told = named_points(other, base)
+        columns.append(replace(other, points=points))
+        notes += told
+    yield Found(tuple(columns), tuple(notes))
     others = without_each(base)
-    columns += columns_of("aerotri lens", base, others)
+    columns[:2] = columns_of("aerotri lens", base, others)
+    yield Found(tuple(columns), tuple(notes))
+    if not entry.colmap:
+        notes.append("pycolmap is not run on blocks with a rig.")
+    for peers in (peers_of(base, others),) if entry.colmap else ():
+        columns += peers
+        yield Found(tuple(columns), tuple(notes))
     if entry.default:
         chosen = adjusted(block, entry.default, entry.robust)
         if isinstance(chosen, str):
             notes.append(f"aerotri default: {chosen}")
         else:
-            columns += columns_of("aerotri default", chosen, without_each(chosen) if entry.default_held else [])
+            held = without_each(chosen) if entry.default_held else []
+            columns[2:2] = columns_of("aerotri default", chosen, held)
             families = chosen.block.settings.adjustment.additional_parameters
             notes.append(f"aerotri default: {', '.join(':'.join([f, '+'.join(i)]) for f, i in families) or 'none'}.")
-    for other in entry.others(data):
-        if other.nameless is not None:
-            points = pix4d.matched(other.nameless, base.adjusted.points.xyz, base.block.points, NEAREST_M)
-            notes.append(f"{other.program}: {len(points)} of {len(other.nameless)} points are within {NEAREST_M} m.")
-            other = replace(other, points=points)
-        columns.append(other)
-    if entry.colmap:
-        try:
-            columns += peers_of(base, others)
-        except RuntimeError as failure:
-            notes.append(f"pycolmap: {failure}")
-    else:
-        notes.append("pycolmap is not run on blocks with a rig.")
-    return Found(tuple(columns), tuple(notes))
+    yield Found(tuple(columns), tuple(notes))
+
+
+def named_points(other: Stated, base: aerotri.Adjustment) -> tuple[Mapping[str, np.ndarray], list[str]]:
+    """Points of another program by our names, and in words how many have one."""
+    if other.nameless is None:
+        return other.points, []
+    points = pix4d.matched(other.nameless, base.adjusted.points.xyz, base.block.points, NEAREST_M)
+    return points, [f"{other.program}: {len(points)} of {len(other.nameless)} points are within {NEAREST_M} m."]
 
 
 @dataclass(frozen=True)
@@ -174,25 +185,31 @@ class Section:
     short: list[str]
 
 
-def section(name: str, data: Path, work: Path, blocks: int) -> Section:
+def sections_of(name: str, data: Path, work: Path, blocks: int) -> Iterator[Section]:
+    """The section of a block, more complete each time."""
     if name == "correlations" or name in SIMULATED:
         lines = correlation_table(data) if name == "correlations" else simulated_section(name, blocks)
-        return Section(lines, lines[2:])
-    found = found_of(name, data, work)
-    notes = ["", *(f"- {note}" for note in found.notes)]
-    lines = [f"## {name}", *sigma_tables(found), *held_table(found), *notes]
-    return Section(lines, [*short_table(found), *held_table(found), *notes])
+        yield Section(lines, lines[2:])
+        return
+    for found in found_of(name, data, work):
+        notes = ["", *(f"- {note}" for note in found.notes)]
+        lines = [f"## {name}", *sigma_tables(found), *held_table(found), *notes]
+        yield Section(lines, [*short_table(found), *held_table(found), *notes])
 
 
 def in_own_process(name: str, options: argparse.Namespace) -> None:
     words = [sys.executable, __file__, str(options.data), "--work", str(options.work), "--one", name,
              "--simulated", str(options.simulated)]  # fmt: skip
     place = options.work / "sections" / f"{name}.json"
+    place.unlink(missing_ok=True)
     try:
         subprocess.run(words, timeout=options.limit, check=True)
     except (subprocess.TimeoutExpired, subprocess.CalledProcessError) as failure:
-        text = [f"## {name}", "", f"Not computed: {str(failure)[-200:]}"]
-        place.write_text(json.dumps({"version": version(), "lines": text, "short": text[2:]}), encoding="utf-8")
+        none = {"version": version(), "lines": [f"## {name}"], "short": []}
+        there = json.loads(place.read_text(encoding="utf-8")) if place.exists() else none
+        why = f"Not computed to the end: {str(failure)[-100:]}."
+        there |= {key: [*there[key], "", why] for key in ("lines", "short")}
+        place.write_text(json.dumps(there), encoding="utf-8")
 
 
 def sections_there(work: Path) -> dict[str, dict]:
@@ -234,9 +251,10 @@ def main() -> None:
     options = parser.parse_args()
     (options.work / "sections").mkdir(parents=True, exist_ok=True)
     if options.one:
-        made = section(options.one, options.data, options.work, options.simulated)
-        text = json.dumps({"version": version(), "lines": made.lines, "short": made.short})
-        (options.work / "sections" / f"{options.one}.json").write_text(text, encoding="utf-8")
+        place = options.work / "sections" / f"{options.one}.json"
+        for made in sections_of(options.one, options.data, options.work, options.simulated):
+            text = json.dumps({"version": version(), "lines": made.lines, "short": made.short})
+            place.write_text(text, encoding="utf-8")
         return
     for name in options.blocks:
         in_own_process(name, options)
