@@ -57,6 +57,8 @@ def test_check_points_are_no_observations(adjusted):
     assert peer.held is not None
     assert own is not None
     np.testing.assert_allclose(peer.held.difference, own.difference, atol=1e-3 * own.sigma.min())
+    held = colmap.stated(adjusted.record.local).points[name]
+    assert (peer.held.sigma[0] > 1.2 * held).all()
 
 
 def test_report_of_dbat(shared_data):

@@ -169,9 +169,9 @@ def computed(name: str, data: Path, work: Path) -> Row:
 def refusal(text: str) -> str:
     """The line of an error, or the last one said."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    wrong = [line for line in lines if line.startswith(("error", "Error", "aerotri: error", "unexpected")) or
-             "unexpected" in line]  # fmt: skip
-    return (wrong or lines or [""])[-1]
+    lines = [line for line in lines if not line.startswith(("what to do", "because"))]
+    wrong = [line for line in lines if (line.startswith("aerotri: ") and " — " in line) or "unexpected" in line]
+    return (wrong or lines or [""])[-1].removeprefix("aerotri: ")
 
 
 def read_outcome(row: Row, outcome: dict[str, Any]) -> None:

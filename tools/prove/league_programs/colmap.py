@@ -1,16 +1,16 @@
 """What pycolmap's BACovariance states for an adjustment of ours: same image points, same unknowns, same datum.
 
-The adjusted block goes to COLMAP as a model in the local frame of the adjustment. pycolmap builds its own problem with
-its own reprojection costs; principal distance, principal point and the radial and decentring terms are free as in ours.
-Control points, observed projection centres and elements that ours holds enter that problem as observations with
-their σ: the datum is the same. `as_it_comes` is another run: two photographs hold the datum, no control, σ of an image
-coordinate 1 pixel. Measures what no command prints: it looks within the package on purpose.
+The adjusted block goes to COLMAP as a model in the local frame of the adjustment. pycolmap builds its own problem
+with its own reprojection costs; principal distance, principal point and the radial and decentring terms are free as
+in ours. Control points, observed projection centres and elements that ours holds enter that problem as observations
+with their σ: the datum is the same. Both state σ of the same solution, ours; that pycolmap finds the same one is
+shown by `aerotri crosscheck`. `as_it_comes`: two photographs hold the datum, no control, σ of an image coordinate 1
+pixel. Measures what no command prints: it looks within the package on purpose.
 """
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,10 +18,8 @@ from typing import Any
 import numpy as np
 import pyceres
 
-from aerotri.adjustment.parallel import thread_count
 from aerotri.adjustment.prepare import with_edits
 from aerotri.colmap_library import pycolmap
-from aerotri.crosscheck.ceres_solver import run_solver
 from aerotri.formats.assembly.oriented import oriented_from_adjusted
 from aerotri.formats.foreign.colmap import point_numbers, write_colmap
 from aerotri.formats.foreign.colmap_rigs import COLMAP_FROM_CAMERA
@@ -29,58 +27,35 @@ from aerotri.functional_model.rotation import angles_from_rotation, small_rotati
 from aerotri.results.adjusted_block import AdjustedBlock
 from league_programs.stated import Held, Stated, bare
 
-HELD_M = 1e-6
-"""σ of what ours holds: positions, m."""
-HELD_LENS, HELD_PX = 1e-7, 1e-4
+HELD_M, HELD_CENTRE_M = 1e-6, 1e-4
+"""σ of what ours holds: points and projection centres."""
+FREE = {3: np.full(3, 1e-6), 7: np.array([1e3] * 4 + [0.1] * 3), 8: np.full(8, 1e-4), 12: np.full(12, 1e-4)}
+"""Weights of what is not observed of points, poses and cameras, by the number of their parameters: nothing beside those
+of image points, and not so small that rounding of the weights observed is larger [C]."""
+HELD_LENS, HELD_PX = 1e-7, 1e-3
 """σ of lens terms of COLMAP's model that ours does not have, and of the difference of its two focal lengths, px."""
 LENS_NAMES = {"k1": 4, "k2": 5, "p1": 6, "p2": 7, "k3": 8, "k4": 9, "k5": 10, "k6": 11}
 """Places in the parameters of FULL_OPENCV, behind fx, fy, cx, cy."""
 
 
-class Linear(pyceres.CostFunction):  # pyright: ignore[reportUntypedBaseClass] -- pyceres has no types
-    """Linear observations of one block: (A·x − value)/σ."""
+def prior(information: np.ndarray, mean: np.ndarray, free: np.ndarray) -> Any:
+    """An observation of a block of parameters by its weight matrix; Ceres' own cost, so that its threads can run.
 
-    def __init__(self, block: np.ndarray, matrix: np.ndarray, value: np.ndarray, sigma: np.ndarray):
-        super().__init__()
-        self.block, self._matrix, self._value = block, matrix / sigma[:, None], value / sigma
-        self.set_num_residuals(len(value))
-        self.set_parameter_block_sizes([len(block)])
-
-    def Evaluate(
-        self, parameters: Sequence[np.ndarray], residuals: np.ndarray, jacobians: Sequence[np.ndarray] | None
-    ) -> bool:
-        """Residuals, and partials where they are asked for."""
-        residuals[:] = self._matrix @ parameters[0] - self._value
-        if jacobians is not None:
-            jacobians[0][:] = self._matrix.ravel()
-        return True
+    Parameters
+    ----------
+    free : weights of directions without weight: pyceres takes covariances.
+    """
+    return pyceres.factors.NormalPrior(mean, np.linalg.inv(information + np.diag(free)))
 
 
-class Centre(pyceres.CostFunction):  # pyright: ignore[reportUntypedBaseClass] -- pyceres has no types
-    """Observed projection centre of a pose (quaternion x, y, z, w; t): (−Rᵀ·t − value)/σ."""
-
-    def __init__(self, block: np.ndarray, axes: np.ndarray, value: np.ndarray, sigma: np.ndarray):
-        super().__init__()
-        self.block, self._axes, self._value, self._sigma = block, axes, value, sigma
-        self.set_num_residuals(len(axes))
-        self.set_parameter_block_sizes([7])
-
-    def Evaluate(
-        self, parameters: Sequence[np.ndarray], residuals: np.ndarray, jacobians: Sequence[np.ndarray] | None
-    ) -> bool:
-        """Residuals, and partials where they are asked for."""
-        v, w, t = parameters[0][:3], parameters[0][3], parameters[0][4:]
-        cross = np.cross(v, t)
-        centre = -(t - 2.0 * w * cross + 2.0 * np.cross(v, cross))
-        residuals[:] = (centre[self._axes] - self._value) / self._sigma
-        if jacobians is not None:
-            partials = np.empty((3, 7))
-            partials[:, :3] = -2.0 * (w * _skew(t) + v @ t * np.eye(3) + np.outer(v, t) - 2.0 * np.outer(t, v))
-            partials[:, 3] = 2.0 * cross
-            turn = np.eye(3) + 2.0 * (_skew(v) @ _skew(v) - w * _skew(v))
-            partials[:, 4:] = -turn
-            jacobians[0][:] = (partials[self._axes] / self._sigma[:, None]).ravel()
-        return True
+def centre_by_pose(pose: np.ndarray) -> np.ndarray:
+    """(3, 7) partials of the projection centre −Rᵀ·t by a pose (quaternion x, y, z, w; t)."""
+    v, w, t = pose[:3], pose[3], pose[4:]
+    partials = np.empty((3, 7))
+    partials[:, :3] = -2.0 * (w * _skew(t) + v @ t * np.eye(3) + np.outer(v, t) - 2.0 * np.outer(t, v))
+    partials[:, 3] = 2.0 * np.cross(v, t)
+    partials[:, 4:] = -(np.eye(3) + 2.0 * (_skew(v) @ _skew(v) - w * _skew(v)))
+    return partials
 
 
 def _skew(a: np.ndarray) -> np.ndarray:
@@ -112,9 +87,14 @@ class Problem:
     def point(self, row: int) -> np.ndarray:
         return self.model.points3D[int(point_numbers(self.ours.block.points)[row])].xyz
 
-    def observe(self, cost: Any) -> None:
-        """Add an observation."""
-        self.adjuster.problem.add_residual_block(cost, None, [cost.block])
+    def observe(self, block: np.ndarray, matrix: np.ndarray, sigma: np.ndarray) -> None:
+        """Add linear observations of a block, by their partials (k, n) and σ (k,): its values now are observed."""
+        weighted = matrix / sigma[:, None]
+        self.add(block, prior(weighted.T @ weighted, block.copy(), FREE[len(block)]))
+
+    def add(self, block: np.ndarray, cost: Any) -> None:
+        """Add a cost of one block."""
+        self.adjuster.problem.add_residual_block(cost, None, [block])
         self.costs.append(cost)
 
 
@@ -126,14 +106,12 @@ def stated(ours: AdjustedBlock) -> Stated:
     ours : in the local frame of the adjustment, by least squares with one σ for all image points.
     """
     problem = _problem(ours, gauge=False)
-    sigma0 = _solved(problem)
-    return _stated("pycolmap, same datum", problem, problem.sigma_px * sigma0)
+    return _stated("pycolmap, same datum", problem, problem.sigma_px * ours.outcome.sigma0)
 
 
 def as_it_comes(ours: AdjustedBlock) -> Stated:
     """σ of pycolmap without control: two photographs hold the datum, σ of an image coordinate is 1 pixel."""
     problem = _problem(ours, gauge=True)
-    problem.adjuster.solve()
     return replace(_stated("pycolmap, as it comes", problem, 1.0), held=None)
 
 
@@ -183,20 +161,20 @@ def _tie_cameras(problem: Problem) -> None:
         ours = problem.ours.block.cameras[number - 1]
         if not problem.adjuster.problem.has_parameter_block(camera.params):
             continue
-        rows, size = [], len(camera.params)
         own = {
             name.removeprefix("lens.")
             for name, group in zip(problem.ours.parameters.names, problem.ours.parameters.groups, strict=True)
             if group == ours.name and name.startswith("lens.")
         }
-        if camera.model.name in ("FULL_OPENCV", "OPENCV"):
-            if "b1" not in own:
-                rows.append((np.eye(size)[0] - np.eye(size)[1], 0.0, HELD_PX))
-            rows += [(np.eye(size)[place], camera.params[place], HELD_LENS) for name, place in LENS_NAMES.items()
-                     if place < size and name not in own]  # fmt: skip
-        if rows:
-            matrix, value, sigma = (np.array(column) for column in zip(*rows, strict=True))
-            problem.observe(Linear(camera.params, matrix, value, sigma))
+        size = len(camera.params)
+        matrix = [np.eye(size)[place] for name, place in LENS_NAMES.items() if place < size and name not in own]
+        sigma = [HELD_LENS] * len(matrix)
+        if camera.model.name not in ("FULL_OPENCV", "OPENCV"):
+            continue
+        if "b1" not in own:
+            matrix, sigma = [*matrix, np.eye(size)[0] - np.eye(size)[1]], [*sigma, HELD_PX]
+        if matrix:
+            problem.observe(camera.params, np.array(matrix), np.array(sigma))
 
 
 def _observe_control(problem: Problem) -> None:
@@ -207,8 +185,7 @@ def _observe_control(problem: Problem) -> None:
         if row not in problem.points or not len(known):
             continue
         sigma = np.maximum(control.sigma[k, known], HELD_M)
-        value = (control.xyz[k] - problem.origin)[known]
-        problem.observe(Linear(problem.point(row), np.eye(3)[known], value, sigma / problem.sigma_px))
+        problem.observe(problem.point(row), np.eye(3)[known], sigma / problem.sigma_px)
 
 
 def _observe_centres(problem: Problem) -> None:
@@ -218,8 +195,8 @@ def _observe_centres(problem: Problem) -> None:
     for k, row in enumerate(gnss.image.tolist()):
         known = np.flatnonzero(np.isfinite(gnss.xyz[k]) & np.isfinite(gnss.sigma[k]))
         if row in problem.images and len(known):
-            value = (gnss.xyz[k] - problem.origin)[known]
-            problem.observe(Centre(problem.pose(row), known, value, gnss.sigma[k, known] / problem.sigma_px))
+            pose = problem.pose(row)
+            problem.observe(pose, centre_by_pose(pose)[known], gnss.sigma[k, known] / problem.sigma_px)
 
 
 def _hold_datum(problem: Problem) -> None:
@@ -234,20 +211,11 @@ def _hold_datum(problem: Problem) -> None:
         if len(held) == 6:
             problem.adjuster.problem.set_parameter_block_constant(problem.pose(row))
         elif len(held):
-            value = (ours.images.centre[row] - problem.origin)[held]
-            problem.observe(Centre(problem.pose(row), held, value, np.full(len(held), HELD_M)))
+            pose = problem.pose(row)
+            problem.observe(pose, centre_by_pose(pose)[held], np.full(len(held), HELD_CENTRE_M))
     for row in problem.points[(ours.points.sigma[problem.points] == 0.0).any(axis=1)].tolist():
         held = np.flatnonzero(ours.points.sigma[row] == 0.0)
-        value = (ours.points.xyz[row] - problem.origin)[held]
-        problem.observe(Linear(problem.point(row), np.eye(3)[held], value, np.full(len(held), HELD_M)))
-
-
-def _solved(problem: Problem) -> float:
-    """Solve; σ̂0, in the unit of our σ of an image coordinate."""
-    vtpv, _, converged = run_solver(problem.adjuster.problem, thread_count())
-    if not converged:
-        raise RuntimeError("Ceres did not converge")
-    return float(np.sqrt(vtpv / problem.sigma_px**2 / problem.ours.outcome.redundancy))
+        problem.observe(problem.point(row), np.eye(3)[held], np.full(len(held), HELD_M))
 
 
 def _stated(program: str, problem: Problem, scale: float) -> Stated:
