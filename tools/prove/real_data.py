@@ -67,10 +67,10 @@ def into_page(page: Path, name: str, lines: Sequence[str]) -> None:
 
 
 def version() -> str:
-    """Commit of the program and its date."""
+    """The last commit that changed the program, and its date."""
     told = subprocess.run(
-        ["git", "log", "-1", "--format=%h %cd", "--date=format:%Y-%m-%d %H:%M"], cwd=Path(__file__).parent,
-        capture_output=True, text=True, check=False,
+        ["git", "log", "-1", "--format=%h %cd", "--date=format:%Y-%m-%d %H:%M", "--", "src"],
+        cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False,
     )  # fmt: skip
     return told.stdout.strip() or aerotri.__version__
 
