@@ -2,22 +2,37 @@
 
 A block may be moved, turned and scaled without changing a ray; only control, GNSS, INS, conditions and held values can
 notice it. Their rows times the seven motions are a small matrix, and its null space is what the datum leaves free, a
-rotation about two control points as well as a plain shift.
+rotation about two control points as well as a plain shift. Whether a motion is free depends on where the observations
+are and on what they observe, never on their σ: every row counts as much as any other. What is noticed by observations
+of large σ alone is weak, not free (`weak_datum`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError, eigh
-from scipy.sparse import csr_array, vstack
+from scipy.sparse import csr_array, diags_array, vstack
 
-from aerotri.adjustment.datum import FOLLOWING, FREEDOMS, motions_of_images, motions_of_points, rig_motions
-from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
-from aerotri.adjustment.null_space import NOT_DETERMINED
+from aerotri.adjustment.datum import (
+    FOLLOWING,
+    FREEDOMS,
+    ExtraObservations,
+    motions_of_images,
+    motions_of_points,
+    rig_motions,
+)
 from aerotri.adjustment.unknowns import State, Unknowns
 from aerotri.functional_model.observed_unknowns import Rows
+
+if TYPE_CHECKING:
+    from aerotri.adjustment.normal_equations import NormalSystem
+
+NOT_NOTICED = 1e-13
+"""Square of the effect, relative to the motion's size, below which nothing notices a motion: squares of rounding lie
+below 1e-20, those of control 1 mm off a straight line of 1 km at 1e-12."""
 
 BESIDE_A_CAMERA = 1e3
 """Square of a column's length over the usual one, above which a point lies beside the camera."""
@@ -53,6 +68,20 @@ class FreeOfObservations:
 
 
 @dataclass(frozen=True, eq=False)
+class WeakMotions:
+    """Motions of the whole block that observations hardly notice, d of them.
+
+    Parameters
+    ----------
+    reduced : (size, d) of photographs and shared parameters. points : (P, 3, d). weakest : the smallest λ.
+    """
+
+    reduced: np.ndarray
+    points: np.ndarray
+    weakest: float
+
+
+@dataclass(frozen=True, eq=False)
 class _Motions:
     """The seven motions about the middle of the block: of photographs (n, 6, 7), points (P, 3, 7), shared (s, 7).
 
@@ -75,10 +104,24 @@ class _Motions:
         return 7 + int((self.place >= 0).sum())
 
 
-def unnoticed_motions(system: NormalSystem, state: State, diagonal: np.ndarray) -> FreeOfObservations:
+def unnoticed_motions(system: NormalSystem, state: State) -> FreeOfObservations:
     """What is free of the seven motions and their combinations, shifts and the like following as they may.
 
-    The measure is that of `null_space`, over the seven motions alone.
+    The measure is that of `null_space` over the seven motions alone, with rows of length one and motions of a metre.
+    """
+    motions = _motions(system.unknowns, state)
+    rows, unit = _of_length_one(_rows(system, state, motions), _reach(motions))
+    weak = _weak((rows.T @ rows).toarray(), np.eye(motions.count))
+    # a second time over the weak ones alone: squares of small numbers, none of them a difference of large ones
+    value, turn = _again(rows @ weak, weak.T @ weak)
+    names, free = _named(weak @ turn[:, value < NOT_NOTICED])
+    return FreeOfObservations(names, _directions(motions, _count(system)) @ (free * unit[:, None]))
+
+
+def weak_motions(system: NormalSystem, state: State, diagonal: np.ndarray, limit: float) -> WeakMotions | None:
+    """The motions of the whole block, with what follows, that are noticed by less than `limit` of their size.
+
+    The measure λ is that of `null_space`: what the observations notice with their σ, over what the rays would.
 
     Parameters
     ----------
@@ -88,13 +131,24 @@ def unnoticed_motions(system: NormalSystem, state: State, diagonal: np.ndarray) 
     directions, diagonal = _directions(motions, len(diagonal)), _without_ties(system, state, diagonal)
     size = _size(motions, directions, diagonal)
     unit = 1.0 / np.sqrt(np.maximum(np.diagonal(size), 1e-300))
-    size, rows = size * np.outer(unit, unit), _rows(system, state, motions, diagonal) * unit[None, :]
+    effects = _rows(system, state, motions, diagonal)
+    size, rows = size * np.outer(unit, unit), csr_array(effects.rows @ diags_array(unit))
     weak = _weak((rows.T @ rows).toarray(), size)
-    # a second time over the weak ones alone: squares of small numbers, none of them a difference of large ones
-    effect = rows @ weak
-    value, turn = eigh(effect.T @ effect, weak.T @ size @ weak) if weak.shape[1] else (np.zeros(0), np.zeros((0, 0)))
-    names, free = _named(weak @ turn[:, value < NOT_DETERMINED])
-    return FreeOfObservations(names, directions @ (free * unit[:, None]))
+    value, turn = _again(rows @ weak, weak.T @ size @ weak)
+    moving = weak @ turn[:, value < limit]
+    moving = moving[:, np.linalg.norm(moving[:7], axis=0) > REAL * np.linalg.norm(moving, axis=0)] * unit[:, None]
+    if not moving.shape[1]:
+        return None
+    return WeakMotions(directions @ moving, motions.points @ moving[:7], float(value.min(initial=np.inf)))
+
+
+def _count(system: NormalSystem) -> int:
+    return 6 * len(system.unknowns.images) + len(system.unknowns.shared)
+
+
+def _again(effect: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Squares of the effects over the sizes, ascending, and the combinations that they belong to."""
+    return eigh(effect.T @ effect, size) if effect.shape[1] else (np.zeros(0), np.zeros((0, 0)))
 
 
 def _without_ties(system: NormalSystem, state: State, diagonal: np.ndarray) -> np.ndarray:
@@ -173,48 +227,102 @@ def _size(motions: _Motions, directions: np.ndarray, diagonal: np.ndarray) -> np
     return size
 
 
-def _rows(system: NormalSystem, state: State, motions: _Motions, diagonal: np.ndarray) -> csr_array:
-    """(·, 7 + a) whitened effect of the motions and of what may follow on every observation that could notice it."""
-    u = system.unknowns
-    parts = [_beside(rows, motions, u.turn(state)) for extra in system.extras for rows in [_of(extra, state)]]
+class _Effects(NamedTuple):
+    """What motions do to observations.
+
+    rows : (r, 7 + a). reach : (r, 7) the same summed without signs: rounding of a row is a share of it.
+    """
+
+    rows: csr_array
+    reach: np.ndarray
+
+
+def _reach(motions: _Motions) -> np.ndarray:
+    """(7 + a,) a shift of 1 m, the turns and the scale that move the points by 1 m in the mean; 1 of what follows."""
+    away = np.linalg.norm(motions.points[motions.seen, :, 6], axis=1)
+    usual = float(np.median(away)) if len(away) else 1.0
+    return np.array([1.0] * 3 + [1.0 / max(usual, 1e-300)] * 4 + [1.0] * (motions.count - 7))
+
+
+def _of_length_one(effects: _Effects, unit: np.ndarray) -> tuple[csr_array, np.ndarray]:
+    """Rows of length one, and (7 + a,) what the columns were multiplied by: motions by `unit`, what follows to one.
+
+    A row counts as long as its parts are before they cancel one another: what is left of one that notices nothing stays
+    rounding.
+    """
+    unit = unit.copy()
+    length = np.linalg.norm(effects.reach * unit[:7], axis=1)
+    by_length = np.where(length > 0.0, 1.0 / np.maximum(length, 1e-300), 1.0)
+    rows = csr_array(diags_array(by_length) @ effects.rows)
+    followed = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=0)).ravel())
+    unit[7:] = 1.0 / np.maximum(followed[7:], 1e-300)
+    rows = csr_array(rows @ diags_array(unit))
+    whole = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel() + (length == 0.0))
+    return csr_array(diags_array(1.0 / np.maximum(whole, 1.0)) @ rows), unit
+
+
+def _rows(system: NormalSystem, state: State, motions: _Motions, diagonal: np.ndarray | None = None) -> _Effects:
+    """Effect of the motions and of what may follow on every observation that could notice it.
+
+    Parameters
+    ----------
+    diagonal : of the normal matrix, where effects are to be divided by their σ; else every σ is one.
+    """
+    u, whitened = system.unknowns, diagonal is not None
+    parts = [_beside(rows, motions, u.turn(state)) for extra in system.extras for rows in [_of(extra, state, whitened)]]
     observed = np.flatnonzero((motions.place >= 0) & np.isfinite(u.shared.sigma))
     of_follower = np.zeros((len(observed), motions.count))
-    of_follower[np.arange(len(observed)), motions.place[observed]] = 1.0 / np.array(u.shared.sigma)[observed]
-    parts.append(csr_array(of_follower))
+    of_follower[np.arange(len(observed)), motions.place[observed]] = (
+        1.0 / np.array(u.shared.sigma)[observed] if whitened else 1.0
+    )
+    parts.append(_Effects(csr_array(of_follower), np.zeros((len(observed), 7))))
+    of_motions = _direct(u, motions, diagonal)
+    beside = np.zeros((len(of_motions), motions.count - 7))
+    parts.append(_Effects(csr_array(np.hstack([of_motions, beside])), np.abs(of_motions)))
+    return _Effects(csr_array(vstack([part.rows for part in parts])), np.concatenate([part.reach for part in parts]))
+
+
+def _direct(u: Unknowns, motions: _Motions, diagonal: np.ndarray | None) -> np.ndarray:
+    """(·, 7) effect on coordinates of control, on what is held, and on arms of rigs."""
     weight = np.sqrt(u.prior_weight) * motions.seen[:, None]
     known, held = weight > 0.0, u.point_held & motions.seen[:, None]
-    # a held value notices as much as all the rays of a photograph
-    squares = diagonal[: u.eo_free.size].reshape(u.eo_free.shape)
-    strength = np.sqrt(np.sum(squares * u.eo_free, axis=0) / np.maximum(u.eo_free.sum(axis=0), 1))
+    strength = np.ones(6)
+    if diagonal is not None:
+        # a held value notices as much as all the rays of a photograph
+        squares = diagonal[: u.eo_free.size].reshape(u.eo_free.shape)
+        strength = np.sqrt(np.sum(squares * u.eo_free, axis=0) / np.maximum(u.eo_free.sum(axis=0), 1))
     held_element = ~u.eo_free & motions.active[:, None]
-    moved = [
-        weight[known][:, None] * motions.points[known],
-        strength[:3].max() * motions.points[held],
-        np.where(strength > 0.0, strength, 1.0)[np.nonzero(held_element)[1], None] * motions.images[held_element],
-        motions.arms,
-    ]
-    of_motions = np.concatenate(moved)
-    beside = np.zeros((len(of_motions), motions.count - 7))
-    return csr_array(vstack([*parts, csr_array(np.hstack([of_motions, beside]))]))
+    return np.concatenate(
+        [
+            (np.ones(known.sum()) if diagonal is None else weight[known])[:, None] * motions.points[known],
+            strength[:3].max() * motions.points[held],
+            np.where(strength > 0.0, strength, 1.0)[np.nonzero(held_element)[1], None] * motions.images[held_element],
+            motions.arms,
+        ]
+    )
 
 
-def _of(extra: ExtraObservations, state: State) -> Rows:
-    return extra.rows(state.centre, state.rotation, state.shared)
+def _of(extra: ExtraObservations, state: State, whitened: bool) -> Rows:
+    rows = extra.rows(state.centre, state.rotation, state.shared)
+    return rows if whitened else replace(rows, inv_sigma=(rows.inv_sigma > 0.0).astype(float))
 
 
-def _beside(rows: Rows, motions: _Motions, turn: np.ndarray) -> csr_array:
+def _beside(rows: Rows, motions: _Motions, turn: np.ndarray) -> _Effects:
     """The rows of observations beside image points and control."""
     own = rows.image >= 0
-    effect = np.zeros((*rows.gap.shape, 7))
+    effect, reach = np.zeros((*rows.gap.shape, 7)), np.zeros((*rows.gap.shape, 7))
     by_image = rows.by_image[own].copy()
     by_image[:, :, 3:] = by_image[:, :, 3:] @ turn[rows.image[own]]
     effect[own] = by_image @ motions.images[rows.image[own]]
+    reach[own] = np.abs(by_image) @ np.abs(motions.images[rows.image[own]])
     row = np.arange(rows.gap.size).reshape(rows.gap.shape)
     places, values = [], []
     for c in range(rows.columns.shape[1]):
         there = rows.columns[:, c] >= 0
         column = rows.columns[there, c]
-        effect[there] += rows.by_shared[there, :, c, None] * motions.shared[column][:, None, :]
+        along = rows.by_shared[there, :, c, None] * motions.shared[column][:, None, :]
+        effect[there] += along
+        reach[there] += np.abs(along)
         place = np.broadcast_to(motions.place[column][:, None], row[there].shape)
         follows = place >= 0
         places.append(np.stack([row[there][follows], place[follows]]))
@@ -225,7 +333,8 @@ def _beside(rows: Rows, motions: _Motions, turn: np.ndarray) -> csr_array:
     # a photograph without rays of its own goes where its observation wants it
     takes_part = ~own
     takes_part[own] = motions.active[rows.image[own]]
-    return csr_array(all_rows[np.flatnonzero((rows.inv_sigma > 0.0) & takes_part[:, None])])
+    kept = np.flatnonzero((rows.inv_sigma > 0.0) & takes_part[:, None])
+    return _Effects(csr_array(all_rows[kept]), (reach * rows.inv_sigma[:, :, None]).reshape(-1, 7)[kept])
 
 
 def _named(free: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.adjustment.block_motions import FreeOfObservations, unnoticed_motions
+from aerotri.adjustment.block_motions import FreeOfObservations, unnoticed_motions, weak_motions
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.null_space import SUSPECT, free_directions, smallest_eigenvalue
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import State
+from aerotri.adjustment.weak_datum import WEAK
 from aerotri.conventions import counted
 
 AT_INFINITY = 100.0
@@ -23,6 +24,8 @@ BEYOND_ALL_MEASURE = 1e6
 """The same of the farthest point of a block that ran away, and of columns beside those of a usual photograph."""
 WRONG_START = "the start values are too far off for any equations:"
 """Begins the sentence on a block whose equations say nothing where they start."""
+SAME = 0.9999
+"""Cosine from which a free direction is a motion of the whole block: a motion of a part has the part's share of it."""
 SHOWN = 6
 """Names listed in one sentence."""
 
@@ -49,7 +52,7 @@ def checked_factor(
     if is_sure and factor is not None:
         return factor, []
     factor = factor or _factor(system, equations)
-    motions = unnoticed_motions(system, state, equations.diagonal)
+    motions = unnoticed_motions(system, state)
     if suspect is None:
         suspect = factor is None or is_suspect(factor, equations)
     if factor is not None and not motions.count and not suspect:
@@ -58,10 +61,10 @@ def checked_factor(
         # no measure holds over so many powers of ten; the verdict says what such a result is worth
         return plain, []
     try:
-        free = free_directions(system, state, equations, estimator, motions.directions)
+        rest = free_besides(system, state, equations, estimator, motions)
     except NotPositiveDefiniteError:
         return None, [without_digits(system, equations)]
-    sentences = _named(system, equations, motions, free)
+    sentences = _named(system, equations, motions, rest)
     factor = None if sentences else _factor(system, equations)
     return factor, sentences if factor or sentences else ["the normal equations are singular"]
 
@@ -125,16 +128,35 @@ def _listed(names: list[str]) -> str:
     return ", ".join(names[:SHOWN]) + (f" and {more} more" if more > 0 else "")
 
 
+def free_besides(
+    system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, motions: FreeOfObservations
+) -> np.ndarray:
+    """(size, k) directions that are free besides motions of the whole block, orthonormal after multiplication by D.
+
+    Motions that something notices, however weakly, are none of them: their σ are large, and `weak_datum` keeps them.
+    """
+    free = free_directions(system, state, equations, estimator, motions.directions)
+    weak = weak_motions(system, state, equations.diagonal, WEAK)
+    all_motions = motions.directions if weak is None else np.hstack([motions.directions, weak.reduced])
+    moved = np.linalg.qr(all_motions * np.sqrt(equations.diagonal)[:, None])[0]
+    _, cosine, turn = np.linalg.svd(moved.T @ free)
+    is_motion = np.zeros(len(turn), dtype=bool)
+    is_motion[: len(cosine)] = cosine > SAME
+    return free @ turn[~is_motion].T
+
+
 def _named(
-    system: NormalSystem, equations: NormalEquations, motions: FreeOfObservations, vectors: np.ndarray
+    system: NormalSystem, equations: NormalEquations, motions: FreeOfObservations, rest: np.ndarray
 ) -> list[str]:
-    """Sentences for the motions of the whole block, and for what else is in the null space."""
+    """Sentences for the motions of the whole block, and for what else is in the null space.
+
+    Those unknowns take part in a direction that move most in units of what rays notice, whatever else is known of them.
+    """
     sentences = [f"the datum is free in {', '.join(motions.names)}"] if motions.names else []
-    moved = np.linalg.qr(motions.directions * np.sqrt(equations.diagonal)[:, None])[0]
-    left, size, _ = np.linalg.svd(vectors - moved @ (moved.T @ vectors), full_matrices=False)
-    rest = left[:, size > 0.5]
+    seen = np.sqrt(np.maximum(equations.of_rays, 0.0) / equations.diagonal)
     for vector in rest.T[:SHOWN]:
-        part = np.abs(vector) / np.abs(vector).max()
+        part = np.abs(vector) * seen
+        part = part / part.max() if part.max() > 0.0 else np.abs(vector) / np.abs(vector).max()
         members = [system.unknowns.name_of(int(k)) for k in np.argsort(-part)[:4] if part[k] > 0.3]
         sentences.append("not determined: " + ", ".join(members))
     if rest.shape[1] > SHOWN:

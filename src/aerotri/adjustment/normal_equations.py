@@ -29,8 +29,9 @@ from aerotri.adjustment.rig_ties import TieRows
 from aerotri.adjustment.rigging import Chain
 from aerotri.adjustment.robust import Estimator, normalised_lengths
 from aerotri.adjustment.shared_priors import SharedPriors
-from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, Symbolic
+from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, NotPositiveDefiniteError, Symbolic
 from aerotri.adjustment.unknowns import State, Step, Unknowns
+from aerotri.adjustment.weak_datum import may_be_weak, weak_factor
 from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.observations import Block, Settings
 
@@ -79,12 +80,16 @@ class NormalEquations(RightSide):
     ----------
     matrix : of photographs and shared parameters.
     diagonal : (6·n + s,) of the same unknowns before the points are eliminated: what rounding is measured against.
+    of_rays : (6·n + s,) the part of the diagonal that rays alone make, undamped.
     chain : of rigid rigs, what leads from stations and mountings to the photographs; None without.
+    at : where they were assembled, the estimator of their weights; None where they are damped.
     """
 
     matrix: BorderedMatrix
     diagonal: np.ndarray
+    of_rays: np.ndarray
     chain: Chain | None = None
+    at: tuple[State, Estimator] | None = None
 
     @property
     def are_numbers(self) -> bool:
@@ -180,6 +185,7 @@ class NormalSystem:
         )
         blocks, border, corner = self._sums.matrix(sums)
         squares, squares_shared = self._sums.squares(sums)
+        of_rays = np.concatenate([squares.ravel(), squares_shared])
         squares_shared += self.priors.weight
         corner = corner + corner.T - np.diag(np.diagonal(corner))
         rows = self.whitened_rows(state)
@@ -202,7 +208,8 @@ class NormalSystem:
         side = self._summed(state, rows, ties, chain, outcomes, problem, self._sums.right(sums))
         whole = np.concatenate([squares.ravel(), squares_shared]) * (1.0 + damping)
         matrix = BorderedMatrix(blocks, border, corner)
-        return NormalEquations(**side.__dict__, matrix=matrix, diagonal=whole, chain=chain)
+        at = (state, estimator) if damping == 0.0 else None
+        return NormalEquations(**side.__dict__, matrix=matrix, diagonal=whole, of_rays=of_rays, chain=chain, at=at)
 
     def right_side(self, state: State, estimator: Estimator) -> RightSide:
         """The right side of the undamped equations at `state` and the cost there: a third of the work of `assemble`."""
@@ -415,8 +422,20 @@ class NormalSystem:
         return other
 
     def factorise(self, equations: NormalEquations, precision: np.dtype[Any] = DOUBLE) -> Factor:
-        """Factor of the reduced matrix; valid until the next one. See `Symbolic.factorise` on the precision."""
-        return self.factorise_like(equations, equations.matrix, precision)
+        """Factor of the reduced matrix; valid until the next one. See `Symbolic.factorise` on the precision.
+
+        Of a block that its observations hardly hold in place one that keeps its digits nevertheless (`weak_datum`).
+        """
+        try:
+            factor = self.factorise_like(equations, equations.matrix, precision)
+        except NotPositiveDefiniteError:
+            factor = None
+        if equations.at is not None and precision == DOUBLE and may_be_weak(factor, equations):
+            held = weak_factor(self, equations, equations.at, lambda matrix: self.factorise_like(equations, matrix))
+            factor = held or factor
+        if factor is None:
+            raise NotPositiveDefiniteError
+        return factor
 
     def factorise_like(
         self, equations: NormalEquations, matrix: BorderedMatrix, precision: np.dtype[Any] = DOUBLE

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from aerotri.adjustment import _covariance_kernels
 from aerotri.adjustment.kernel_records import Directions, Inverse
-from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.unknowns import State
+
+if TYPE_CHECKING:
+    from aerotri.adjustment.normal_equations import NormalSystem
 
 
 def point_cofactors(

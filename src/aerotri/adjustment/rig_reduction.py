@@ -38,6 +38,7 @@ class RigReduction:
         count = len(self.leads)
         number = np.full(len(rigging.lead), -1, dtype=np.int64)
         number[self.leads] = np.arange(count)
+        self.pattern = block_row, block_col
         of = number[rigging.lead]
         low, high = np.minimum(of[block_row], of[block_col]), np.maximum(of[block_row], of[block_col])
         unique, inverse = np.unique(low * count + high, return_inverse=True)
@@ -107,6 +108,11 @@ class RigFactor(Factor):
     def __init__(self, factor: Factor, reduction: RigReduction, chain: Chain):
         self._factor, self._reduction, self._chain = factor, reduction, chain
         self.smallest_pivot = factor.smallest_pivot
+
+    @property
+    def pattern(self) -> tuple[np.ndarray, np.ndarray]:
+        """Row and column photograph of every block of the inverse on the pattern."""
+        return self._reduction.pattern
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """C·(CᵀNC)⁻¹·Cᵀ·rhs, (6·n + s,) or (6·n + s, k)."""

@@ -95,10 +95,14 @@ class SharedPriors:
 
     def products(self, shared: np.ndarray) -> np.ndarray:
         """VᵀWV (k, k) of directions V (s, k) with the weights W."""
-        total = shared.T @ (self.weight[:, None] * shared)
+        return shared.T @ self.pulls(shared)
+
+    def pulls(self, shared: np.ndarray) -> np.ndarray:
+        """W·V (s, k) of directions V (s, k) with the weights W."""
+        pulls = self.weight[:, None] * shared
         for prior in self.joint:
-            total += shared[prior.columns].T @ prior.weight @ shared[prior.columns]
-        return total
+            pulls[prior.columns] += prior.weight @ shared[prior.columns]
+        return pulls
 
     def root(self) -> np.ndarray:
         """(s, k) R with R·Rᵀ the weights."""

@@ -173,6 +173,11 @@ class Factor:
             raise StaleFactorError("another matrix was factorised in the place of this factor: factorise anew")
         return self._of
 
+    @property
+    def pattern(self) -> tuple[np.ndarray, np.ndarray]:
+        """Row and column photograph of every block of the inverse on the pattern."""
+        return self._of.block_row, self._of.block_col
+
     def _permutation(self) -> np.ndarray:
         s = self._symbolic
         images = (B * s.tree.order[:, None] + np.arange(B)).ravel()

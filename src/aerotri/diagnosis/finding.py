@@ -8,13 +8,18 @@ from typing import Literal
 import numpy as np
 from scipy.special import gammaincc, ndtri
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.statistics.image_sigma import ImageSigma, image_sigmas
 
 Grade = Literal["accepted", "doubtful", "rejected"]
 GRADES: tuple[Grade, ...] = ("accepted", "doubtful", "rejected")
 
 SIGNIFICANCE = 0.001
 """Probability with which a rule may doubt a faultless block by chance."""
+
+SIGMA_GROUPS = 5
+"""Groups of image points of one a-priori σ that are listed; of more the range is given."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,26 @@ def metre_digits(sigma: np.ndarray) -> int:
     return int(np.clip(np.ceil(-np.log10(np.median(finite))) + 1, 3, 6)) if len(finite) else 3
 
 
-def pixel_text(value_um: float, adjusted: AdjustedBlock) -> str:
-    """', 0.29 px' where all cameras have one size of pixel, '' otherwise."""
+def sigma0_in_image(adjusted: AdjustedBlock) -> str:
+    """σ̂0 as standard deviation of an image coordinate: '1.16 µm, 0.29 px'; of most where their σ differ."""
+    o, groups = adjusted.outcome, _image_sigmas(adjusted)
+    if len(groups) == 1:
+        return groups[0].text(o.sigma0)
     sizes = {camera.pixel_um for camera in adjusted.block.cameras}
-    return f", {value_um / sizes.pop():.2f} px" if len(sizes) == 1 else ""
+    pixel = f", {o.sigma0_um / sizes.pop():.2f} px" if len(sizes) == 1 else ""
+    return f"{o.sigma0_um:.2f} µm{pixel}" + (" in the median" if groups else "")
+
+
+def sigma0_by_group(adjusted: AdjustedBlock) -> list[str]:
+    """σ̂0 of every group of image points, where their a-priori σ differ: a line each, of many groups the range."""
+    sigma0, groups = adjusted.outcome.sigma0, _image_sigmas(adjusted)
+    if len(groups) < 2:
+        return []
+    if len(groups) > SIGMA_GROUPS:
+        low, high = min(group.sigma_um for group in groups), max(group.sigma_um for group in groups)
+        return [f"stated σ of image points {low:.3g} to {high:.3g} µm: {sigma0 * low:.2f} to {sigma0 * high:.2f} µm"]
+    return [f"{group.count} image points of stated σ {group.sigma_um:.3g} µm: {group.text(sigma0)}" for group in groups]
+
+
+def _image_sigmas(adjusted: AdjustedBlock) -> list[ImageSigma]:
+    return image_sigmas(adjusted.block, np.flatnonzero(adjusted.rays.status == RayStatus.USED))

@@ -12,7 +12,8 @@ from aerotri.diagnosis.finding import (
     critical_of_worst,
     doubt,
     graded,
-    pixel_text,
+    sigma0_by_group,
+    sigma0_in_image,
     times,
 )
 from aerotri.quantiles import chi_square_quantile, normal_quantile
@@ -48,7 +49,7 @@ def of_status(adjusted: AdjustedBlock) -> list[Finding]:
 def of_sigma0(adjusted: AdjustedBlock) -> list[Finding]:
     """σ̂0 against 1: by χ², and by its size."""
     o = adjusted.outcome
-    value = f"{o.sigma0:.3f} ({o.sigma0_um:.2f} µm{pixel_text(o.sigma0_um, adjusted)})"
+    value = f"{o.sigma0:.3f} ({'; '.join([sigma0_in_image(adjusted), *sigma0_by_group(adjusted)])})"
     if o.redundancy < 1 or not np.isfinite(o.sigma0):
         says = "without redundancy nothing can be said"
         reason = f"redundancy {o.redundancy}: nothing controls the observations, σ is not known"

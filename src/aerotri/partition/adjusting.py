@@ -27,6 +27,7 @@ from aerotri.partition.placing import Place, place_of
 from aerotri.partition.telling import Say, Told
 from aerotri.partition.whole import PARTS, Whole, whole_of
 from aerotri.results.adjusted_block import Outcome
+from aerotri.statistics.image_sigma import sigma0_um
 from aerotri.statistics.model_part import of_parameters
 from aerotri.statistics.summarise import parameters_of
 
@@ -124,7 +125,7 @@ def _with_sigma(
     outcome = Outcome(
         status=ended.status,
         message="" if ended.status == "converged" else f"no convergence within {ended.iterations} iterations",
-        iterations=ended.iterations, sigma0=sigma0, sigma0_um=sigma0 * first.settings.image_sigma_um, vtpv=vtpv,
+        iterations=ended.iterations, sigma0=sigma0, sigma0_um=sigma0_um(sigma0, first), vtpv=vtpv,
         observations=observations, unknowns=unknowns, conditions=0, redundancy=observations - unknowns,
     )  # fmt: skip
     model = model_part_of(course, place, first, ended.status, sigma0, photographs)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.diagnosis.check_points import GroundStatistics, asprs_warning, ground_statistics
-from aerotri.diagnosis.finding import metre_digits, pixel_text
+from aerotri.diagnosis.finding import metre_digits, sigma0_by_group, sigma0_in_image
 
 MANY_CELLS = 2.0
 """Cells of a median σ above which a surface or an orthophoto says so first; chosen [C]."""
 
 __all__ = [
-    "GroundStatistics", "asprs_warning", "ground_statistics", "many_cells", "metre_digits", "pixel_text", "printable",
-    "two_digits", "with_sigma",
+    "GroundStatistics", "asprs_warning", "ground_statistics", "many_cells", "metre_digits", "printable",
+    "sigma0_by_group", "sigma0_in_image", "two_digits", "with_sigma",
 ]  # fmt: skip
 
 

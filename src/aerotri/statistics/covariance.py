@@ -14,6 +14,7 @@ from aerotri.adjustment.point_sides import point_cofactors, solve_sides
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.unknowns import State, Unknowns
+from aerotri.adjustment.weak_datum import WeakFactor
 from aerotri.functional_model.rotation import angles_from_rotation, small_rotation_per_angle
 
 
@@ -97,6 +98,9 @@ def cofactors(system: NormalSystem, state: State, factor: Factor, estimator: Est
     with blas_threads(0.0):
         inverse = factor.inverse_on_pattern()
         points, redundancy = point_cofactors(system, state, inverse, estimator)
+        if isinstance(factor, WeakFactor):
+            # no motion of the block changes a residual, and of its large cofactors none but the rounding
+            redundancy = point_cofactors(system, state, factor.inverse_of_shape(), estimator)[1]
     images, border = _without_held(system.unknowns, inverse)
     result = Cofactors(images, inverse.corner, points, border, redundancy, inverse)
     if is_inner(system):

@@ -31,6 +31,7 @@ from aerotri.results.normalised import normalised_residuals
 from aerotri.statistics.covariance import Cofactors, cofactors, correlations, orientation_cofactors, total_correlations
 from aerotri.statistics.external_reliability import ray_effects, row_effects
 from aerotri.statistics.held_control import HeldTests, held_tests
+from aerotri.statistics.image_sigma import sigma0_um
 from aerotri.statistics.ray_correlation import ray_correlation
 from aerotri.statistics.reliability import detectable_share, suspected_blunders
 from aerotri.statistics.rig_movements import movement_groups, rig_movements
@@ -86,7 +87,7 @@ def summarise(
         message="" if solution.status == "converged" else _message(solution, sigma0),
         iterations=solution.iterations,
         sigma0=sigma0,
-        sigma0_um=sigma0 * block.settings.image_sigma_um,
+        sigma0_um=sigma0_um(sigma0, block, system.unknowns.rays.source),
         vtpv=vtpv,
         observations=counts.observations,
         unknowns=counts.unknowns,

@@ -37,6 +37,7 @@ from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import format_parameters
 from aerotri.observations import Block, DeviationSettings
 from aerotri.results.parameter_comparison import Accuracy, Choice, ParameterComparison, SetOutcome
+from aerotri.statistics.image_sigma import sigma0_um
 from aerotri.statistics.summarise import count_observations, effective_redundancy, weighted_sum
 from aerotri.strategies.control_prediction import control_rows, predict_control
 from aerotri.strategies.deviation_estimation import with_estimated_deviations
@@ -229,7 +230,7 @@ def _fitted(
         effective=effective,
         significant=int(np.sum(t > SIGNIFICANT_T)),
         sigma0=sigma0,
-        sigma0_um=sigma0 * settings.image_sigma_um,
+        sigma0_um=sigma0_um(sigma0, system.unknowns.block, system.unknowns.rays.source),
         aic=deviance + 2.0 * effective,
         bic=float(bic),
         check=NOWHERE,

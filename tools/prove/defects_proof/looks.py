@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.adjustment.defects import checked_factor
+from aerotri.adjustment.block_motions import unnoticed_motions
+from aerotri.adjustment.defects import checked_factor, free_besides
 from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.null_space import free_directions, smallest_eigenvalue
+from aerotri.adjustment.null_space import smallest_eigenvalue
 from aerotri.adjustment.prepare import prepare
 from aerotri.adjustment.robust import LEAST_SQUARES
 from aerotri.adjustment.unknowns import State
@@ -20,7 +21,7 @@ from defects_proof.cases import Case, cases
 from defects_proof.variants import VARIANTS
 
 DENSE_ZERO = 1e-9
-"""Singular value of the design matrix with columns of length one, below which a direction is free."""
+"""Singular value of the design matrix with rows and columns of length one, below which a direction is free."""
 
 
 @dataclass(frozen=True)
@@ -69,26 +70,36 @@ def look_at(case: Case, seed: int, variant: str) -> Look:
     factor, said = checked_factor(system, state, equations, LEAST_SQUARES)
     design = dense_design(system, state)
     length = np.linalg.norm(design, axis=0)
-    scaled = design[:, length > 0.0] / length[length > 0.0]
-    _, values, right = np.linalg.svd(np.linalg.qr(scaled, mode="r"), full_matrices=len(scaled) < scaled.shape[1])
-    values = np.concatenate([values, np.zeros(scaled.shape[1] - len(values))])
+    values = _singular_values(design[:, length > 0.0])
     null = values < DENSE_ZERO
     singular = float(values[null].max(initial=0.0)), float(values[~null].min())
     pivot, estimate, error, free = np.nan, np.nan, np.nan, 0
     if factor is not None:
         pivot, estimate = factor.smallest_pivot, smallest_eigenvalue(factor, equations.diagonal)
-        error = _sigma_error(system, factor, right.T / values, length)
+        error = _sigma_error(system, factor, design, length)
     else:
-        nothing = np.zeros((len(equations.diagonal), 0))
-        free = free_directions(system, state, equations, LEAST_SQUARES, nothing).shape[1]
+        motions = unnoticed_motions(system, state)
+        free = motions.count + free_besides(system, state, equations, LEAST_SQUARES, motions).shape[1]
     return Look(
         case.name, seed, variant, case.free, int(null.sum()), case.words, "; ".join(said), pivot, estimate, free,
         singular, error,
     )  # fmt: skip
 
 
-def _sigma_error(system: NormalSystem, factor, root: np.ndarray, length: np.ndarray) -> float:
+def _singular_values(design: np.ndarray) -> np.ndarray:
+    """Of the matrix with rows and then columns of length one, as many as it has columns: σ take no part."""
+    lengths = np.linalg.norm(design, axis=1, keepdims=True)
+    rows = design / np.where(lengths > 0.0, lengths, 1.0)
+    scaled = rows / np.linalg.norm(rows, axis=0)
+    values = np.linalg.svd(np.linalg.qr(scaled, mode="r"), compute_uv=False)
+    return np.concatenate([values, np.zeros(scaled.shape[1] - len(values))])
+
+
+def _sigma_error(system: NormalSystem, factor, design: np.ndarray, length: np.ndarray) -> float:
     """Largest relative difference of σ from the singular value decomposition, of the reduced unknowns."""
+    scaled = design[:, length > 0.0] / length[length > 0.0]
+    _, values, right = np.linalg.svd(np.linalg.qr(scaled, mode="r"))
+    root = right.T / values
     size = system.symbolic.size
     there = np.flatnonzero(length > 0.0)
     dense = np.zeros(len(length))

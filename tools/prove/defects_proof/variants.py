@@ -52,10 +52,29 @@ def moved(block: Block, scale: float = 1.0, shift: tuple[float, float, float] = 
     )
 
 
+def with_sigma(block: Block, control: tuple[float, float, float], rays: float = 1.0) -> Block:
+    """σ multiplied: those of control, GNSS and conditions axis by axis, and those of the rays of every other one."""
+    by = np.array(control)
+    changes = {}
+    if block.gnss_ins is not None:
+        changes["gnss_ins"] = replace(block.gnss_ins, sigma=block.gnss_ins.sigma * by)
+    if block.constraints is not None:
+        changes["constraints"] = replace(block.constraints, sigma=block.constraints.sigma * by[2])
+    sigma = block.image_points.sigma.copy()
+    sigma[::2] *= rays
+    seen = replace(block.control, sigma=block.control.sigma * by)
+    return replace(block, control=seen, image_points=replace(block.image_points, sigma=sigma), **changes)
+
+
 VARIANTS: dict[str, Callable[[Block], Block]] = {
     "as it is": lambda block: block,
     "rows permuted": permuted,
     "coordinates × 0.001": lambda block: moved(block, 1e-3),
     "coordinates × 1000": lambda block: moved(block, 1e3),
     "shifted by 5000 km": lambda block: moved(block, shift=(5e6, 5e6, 0.0)),
+    "σ of control × 0.001": lambda block: with_sigma(block, (1e-3, 1e-3, 1e-3)),
+    "σ of control × 1000": lambda block: with_sigma(block, (1e3, 1e3, 1e3)),
+    "σ of control × 10000": lambda block: with_sigma(block, (1e4, 1e4, 1e4)),
+    "σ of X × 0.001, of Z × 1000": lambda block: with_sigma(block, (1e-3, 1.0, 1e3)),
+    "σ of every other ray × 1000": lambda block: with_sigma(block, (1.0, 1.0, 1.0), 1e3),
 }

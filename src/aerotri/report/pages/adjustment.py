@@ -307,7 +307,9 @@ def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
 def _cards(adjusted: AdjustedBlock) -> list[tuple[str, str, str]]:
     """Heading, number and small print of the boxes at the top."""
     o = adjusted.outcome
-    cards = [("σ₀", f"{o.sigma0:.3f}", f"{o.sigma0_um:.2f} µm{quality.pixel_text(o.sigma0_um, adjusted)}")]
+    cards = [
+        ("σ₀", f"{o.sigma0:.3f}", "; ".join([quality.sigma0_in_image(adjusted), *quality.sigma0_by_group(adjusted)]))
+    ]
     for heading, results in (("Check points", adjusted.check), ("Control points", adjusted.control)):
         if len(results):
             s, d = quality.ground_statistics(adjusted, results), quality.metre_digits(results.sigma)

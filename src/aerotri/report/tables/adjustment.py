@@ -14,7 +14,14 @@ from aerotri.functional_model.additional_parameters import unit_of as unit_of_pa
 from aerotri.functional_model.additional_parameters.family import NO_UNIT
 from aerotri.image_errors import interior_elements, interior_model_sigmas, largest_effects
 from aerotri.observations.block import INTERIOR_ELEMENTS
-from aerotri.report.quality import asprs_warning, ground_statistics, metre_digits, pixel_text, printable
+from aerotri.report.quality import (
+    asprs_warning,
+    ground_statistics,
+    metre_digits,
+    printable,
+    sigma0_by_group,
+    sigma0_in_image,
+)
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Outcome
 
 TOP_RESIDUALS = 30
@@ -360,7 +367,7 @@ def _sigma0_line(adjusted: AdjustedBlock) -> str:
         return "sigma0 not known"
     if o.sigma0 < SMALL_SIGMA0:
         return f"sigma0 {o.sigma0:.2g} ({o.sigma0_um:.2g} µm)"
-    return f"sigma0 {o.sigma0:.3f} ({o.sigma0_um:.2f} µm{pixel_text(o.sigma0_um, adjusted)})"
+    return f"sigma0 {o.sigma0:.3f} ({sigma0_in_image(adjusted)})"
 
 
 def summary_lines(adjusted: AdjustedBlock) -> list[str]:
@@ -373,6 +380,7 @@ def summary_lines(adjusted: AdjustedBlock) -> list[str]:
         f"{printable(adjusted.block.name)}: {o.status} after {counted(o.iterations, 'iteration')}"
         + (f": {o.message}" * bool(o.message)),
         _sigma0_line(adjusted),
+        *(f"  {line}" for line in sigma0_by_group(adjusted)),
         f"redundancy {o.redundancy} = {o.observations} observations − {o.unknowns} unknowns"
         + (f" + {counted(o.conditions, 'condition')}" if o.conditions else ""),
         f"{counted(len(adjusted.block.images), 'photograph')}, {counted(len(adjusted.block.points), 'point')}, "
