@@ -14,7 +14,7 @@ from small_blocks import small_block, with_adjustment
 
 def with_sigma(factors):
     """A block whose image points have σ of their own, the usual ones times `factors` in turn; its measurements too."""
-    block, truth = small_block(14, **TINY)
+    block = small_block(14, **TINY)[0]
     block = with_adjustment(block, additional_parameters=parse_parameters("none"))
     rays = block.image_points
     by = np.resize(np.asarray(factors, float), len(rays))[:, None]

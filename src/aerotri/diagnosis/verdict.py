@@ -7,7 +7,10 @@ from dataclasses import dataclass, replace
 
 from aerotri.diagnosis import (
     check_points,
+    common_motion,
     common_shift,
+    control_digits,
+    control_limits,
     fit,
     geometry,
     left_out,
@@ -31,6 +34,9 @@ RULES: tuple[Rule, ...] = (
     check_points.of_means,
     moving_errors.of_model_part,
     common_shift.of_common_shift,
+    common_motion.of_common_motion,
+    control_digits.of_digits,
+    control_limits.of_control,
     position_errors.of_positions,
     neighbouring_rays.of_neighbouring_rays,
     photograph_fields.of_photograph_fields,

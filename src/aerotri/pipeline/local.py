@@ -29,6 +29,7 @@ from aerotri.results.deviations import Deviations
 from aerotri.results.photograph_fields import PhotographFields
 from aerotri.results.position_errors import PositionErrors
 from aerotri.results.removal import Removal
+from aerotri.statistics.common_motion import common_motion
 from aerotri.statistics.common_shift import common_shift
 from aerotri.statistics.loose_points import loose_by_rays, loose_in_words, loose_points, to_set_aside
 from aerotri.statistics.rigidity import rigidity_of
@@ -212,9 +213,11 @@ def _with_words(delivered: _Delivered, timings: dict[str, float]) -> Adjustment:
     errors = position_errors_of(system, solution, delivered.factor, sigma0, stand.position_errors)
     rigidity = rigidity_of(system, solution, delivered.factor, result.outcome)
     shift = common_shift(system, solution, delivered.factor, sigma0)
+    motion = common_motion(system, solution, delivered.factor, sigma0)
     fields = photograph_fields_of(system, sigma0, stand.photograph_fields)
     result = replace(
-        result, position_errors=errors, rigidity=rigidity, common_shift=shift, photograph_fields=fields
+        result, position_errors=errors, rigidity=rigidity, common_shift=shift, common_motion=motion,
+        photograph_fields=fields,
     )  # fmt: skip
     timings = timings | {"statistics": time.perf_counter() - delivered.solved}
     tied = () if stand.deviations is None else (stand.deviations.sentence,)

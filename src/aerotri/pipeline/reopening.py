@@ -20,6 +20,7 @@ from aerotri.pipeline.relative import with_relative
 from aerotri.pipeline.verdict import judged, with_purpose
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.in_crs import transform_result
+from aerotri.statistics.common_motion import common_motion
 from aerotri.statistics.common_shift import common_shift
 from aerotri.statistics.rigidity import rigidity_of
 from aerotri.statistics.summarise import summarise
@@ -66,7 +67,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     shift = common_shift(system, solution, factor, result.outcome.sigma0)
     result = replace(
         result, position_errors=saved.position_record(), photograph_fields=saved.photograph_record(), rigidity=rigidity,
-        common_shift=shift,
+        common_shift=shift, common_motion=common_motion(system, solution, factor, result.outcome.sigma0),
     )  # fmt: skip
     components = saved.component_record()
     if components is not None:

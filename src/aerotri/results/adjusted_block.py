@@ -14,6 +14,7 @@ from aerotri.observations import Block
 from aerotri.results.head import Head, now
 
 if TYPE_CHECKING:
+    from aerotri.results.common_motion import CommonMotion
     from aerotri.results.common_shift import CommonShift
     from aerotri.results.deviations import Deviations
     from aerotri.results.model_part import ModelPart
@@ -340,8 +341,8 @@ class AdjustedBlock:
     how they move on weighted rigs.
     `deviations` says how much parameters differ between groups of photographs that are tied to one another,
     `ray_correlation` how much neighbouring rays of a photograph err alike, `common_shift` what all observed positions
-    are shifted against the control points, `photograph_fields` how much photographs have smooth errors of their own,
-    `relative` the σ of the shape of the block.
+    are shifted against the control points, `common_motion` what they are turned and scaled,
+    `photograph_fields` how much photographs have smooth errors of their own, `relative` the σ of the shape of the block.
     """
 
     block: Block
@@ -369,6 +370,7 @@ class AdjustedBlock:
     common_shift: CommonShift | None = None
     photograph_fields: PhotographFields | None = None
     relative: RelativePrecision | None = None
+    common_motion: CommonMotion | None = None
 
 
 def head_of(adjusted: AdjustedBlock) -> Head:

@@ -42,7 +42,7 @@ def common_shift(system: NormalSystem, solution: Solution, factor: Factor, sigma
 
 def _of_rows(rows: Rows, factor: Factor, counts: tuple[int, int], sigma0: float) -> CommonShift | None:
     whitened = rows.inv_sigma[:, :, None] * np.eye(3)
-    left = whitened - _explained(rows, whitened, factor, counts)
+    left = whitened - explained_by_others(rows, whitened, factor, counts)
     weight, normals = np.einsum("gak,gak->k", whitened, whitened), np.einsum("gak,gaj->kj", whitened, left)
     scale = np.sqrt(weight)
     if not weight.all() or np.linalg.eigvalsh(normals / scale[:, None] / scale)[0] < DETERMINED:
@@ -56,7 +56,7 @@ def _of_rows(rows: Rows, factor: Factor, counts: tuple[int, int], sigma0: float)
     return CommonShift(shift, noise * np.sqrt(np.diagonal(cofactors)), p)
 
 
-def _explained(rows: Rows, whitened: np.ndarray, factor: Factor, counts: tuple[int, int]) -> np.ndarray:
+def explained_by_others(rows: Rows, whitened: np.ndarray, factor: Factor, counts: tuple[int, int]) -> np.ndarray:
     """(g, 3, k) E·Q·Eᵀ of k columns (g, 3, k).
 
     Parameters

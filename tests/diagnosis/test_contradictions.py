@@ -1,0 +1,94 @@
+"""Control, GNSS and photographs that contradict one another as a whole, though each fits by itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import aerotri
+from aerotri.diagnosis import findings
+from aerotri.functional_model.additional_parameters import parse_parameters
+from aerotri.pipeline import adjust_keeping_system
+from aerotri.results.common_motion import CHANCE
+from dense_algebra import TINY
+from small_blocks import small_block, with_adjustment
+
+WHITE = {"sigma_m": [0.03, 0.03, 0.05]}
+
+
+def block_with_gnss(seed=3, change=None, shift="off"):
+    """A faultless block with GNSS, its control changed by `change(xyz from the middle)`."""
+    block = with_adjustment(small_block(seed, gnss=WHITE, **TINY)[0], additional_parameters=parse_parameters("none"))
+    block = replace(block, settings=replace(block.settings, gnss=replace(block.settings.gnss, shift=shift)))
+    if change is None:
+        return block
+    control = block.control
+    own, xyz = ~control.is_check, control.xyz.copy()
+    xyz[own] += change(xyz[own] - xyz[own].mean(axis=0))
+    return replace(block, control=replace(control, xyz=xyz))
+
+
+def tilted(off):
+    return np.stack([0.0 * off[:, 0], 0.0 * off[:, 0], 2.0 * off[:, 0] / np.ptp(off[:, 0])], axis=1)
+
+
+def in_grid(off):
+    return off * np.array([-1e-3, -1e-3, 0.0])
+
+
+def turned(off):
+    return 1e-3 * np.stack([-off[:, 1], off[:, 0], 0.0 * off[:, 0]], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("change", "words", "shift"),
+    [(tilted, "tilted by", "off"), (in_grid, "in scale", "block"), (turned, "turned in plan", "off")],
+)
+def test_a_contradiction_is_said(change, words, shift):
+    result = aerotri.adjust(block_with_gnss(change=change, shift=shift))
+    assert result.verdict != "accepted"
+    assert any(words in reason for reason in result.reasons)
+
+
+def test_its_size():
+    """A scale of −1000 ppm of the control is +1000 ppm of the positions against it, within its σ."""
+    motion = adjust_keeping_system(block_with_gnss(change=in_grid, shift="block")).local.common_motion
+    assert abs(motion.scale - 1e-3) < 4.0 * motion.scale_sigma
+    assert motion.scale_sigma < 3e-4
+
+
+@pytest.mark.parametrize("shift", ["off", "block"])
+def test_faultless_blocks_do_not_contradict_themselves(shift):
+    """Their probabilities are spread evenly between 0 and 1."""
+    motions = [adjust_keeping_system(block_with_gnss(seed, shift=shift)).local.common_motion for seed in range(1, 7)]
+    assert all(not motion.counts for motion in motions)
+    p = np.array([[motion.p_tilt, motion.p_turn, motion.p_scale] for motion in motions])
+    assert 0.2 < np.median(p) < 0.8
+    assert p.min() > CHANCE
+
+
+def test_without_positions_there_is_none():
+    assert adjust_keeping_system(replace(block_with_gnss(), gnss_ins=None)).local.common_motion is None
+
+
+def rounded(block, step, sigma):
+    control = block.control
+    own, xyz, stated = ~control.is_check, control.xyz.copy(), control.sigma.copy()
+    xyz[own] = np.round(xyz[own] / step) * step
+    stated[own] = sigma
+    return replace(block, control=replace(control, xyz=xyz, sigma=stated))
+
+
+@pytest.mark.parametrize(("step", "sigma", "said"), [(1.0, 0.05, True), (1.0, 0.5, False), (0.01, 0.02, False)])
+def test_coordinates_with_too_few_digits(step, sigma, said):
+    result = aerotri.adjust(rounded(block_with_gnss(), step, sigma))
+    assert any("are rounded to" in reason for reason in result.reasons) == said
+
+
+def test_what_control_alone_cannot_show():
+    """A note on the page, of a block that is accepted."""
+    result = aerotri.adjust(replace(block_with_gnss(), gnss_ins=None))
+    notes = [f for f in findings(result.record.local) if f.quantity == "what this block cannot show"]
+    assert len(notes) == 1
+    assert "height of the pole" in notes[0].says
+    assert notes[0].grade == "accepted"
