@@ -1,49 +1,54 @@
-"""σ̂0 in the image, where the image points do not have the σ that the block states for them in common."""
+"""σ of image coordinates by camera: cameras with pixels of different sizes."""
 
-from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-import aerotri
-from aerotri.functional_model.additional_parameters import parse_parameters
-from aerotri.report.tables.adjustment import summary_lines
-from dense_algebra import TINY
-from small_blocks import small_block, with_adjustment
+from aerotri.statistics import image_sigma
+from aerotri.statistics.image_sigma import image_sigma_of_cameras
+from aerotri.volume.parts import matching_sigma_mm
+from aerotri.volume.pickets import pickets_of_names
+from aerotri.volume.settings import SigmaOptions
+
+PIXEL_MM = np.array([3.76e-3, 9e-3, 5e-3])
+SIGMA_PX, SIGMA0 = 0.5, 1.2
 
 
-def with_sigma(factors):
-    """A block whose image points have σ of their own, the usual ones times `factors` in turn; its measurements too."""
-    block = small_block(14, **TINY)[0]
-    block = with_adjustment(block, additional_parameters=parse_parameters("none"))
-    rays = block.image_points
-    by = np.resize(np.asarray(factors, float), len(rays))[:, None]
-    return replace(block, image_points=replace(rays, sigma=rays.sigma * by))
+def calibration_of(share):
+    """A share of 1000 rays is of the first camera, the others of the second; the third has none."""
+    camera = (np.arange(1000) >= share * 1000).astype(int)
+    sigma = np.repeat((SIGMA_PX * PIXEL_MM)[camera][:, None], 2, axis=1)
+    rays = SimpleNamespace(image=camera, sigma=sigma)
+    images = SimpleNamespace(names=np.array(["a", "b", "c"]), camera=np.arange(3))
+
+    class Rays(SimpleNamespace):
+        def __len__(self):
+            return len(self.sigma)
+
+    block = SimpleNamespace(image_points=Rays(**vars(rays)), images=images, cameras=[None] * 3)
+    return SimpleNamespace(local=SimpleNamespace(block=block, outcome=SimpleNamespace(sigma0=SIGMA0)))
 
 
-def lines_of(result):
-    return [line for line in summary_lines(result.adjusted) if "µm" in line]
+@pytest.fixture(autouse=True)
+def no_field(monkeypatch):
+    """Nothing but noise in the residuals."""
+    monkeypatch.setattr(image_sigma, "noise_beside_field", lambda found: found.local.outcome.sigma0)
 
 
-def test_own_sigma_of_all_rays():
-    """All σ twice the common one: σ0 halves, and in µm it is what it was."""
-    common, own = aerotri.adjust(with_sigma([1.0])), aerotri.adjust(with_sigma([2.0]))
-    assert own.sigma0 == pytest.approx(0.5 * common.sigma0, rel=0.05)
-    assert own.sigma0_um == pytest.approx(common.sigma0_um, rel=0.05)
-    assert len(lines_of(own)) == 1
+@pytest.mark.parametrize("share", [0.4, 0.6])
+def test_every_camera_has_its_own_sigma(share):
+    found = image_sigma_of_cameras(calibration_of(share))
+    np.testing.assert_allclose(found[:2] / PIXEL_MM[:2], SIGMA0 * SIGMA_PX)
+    # a camera without image points has that of all
+    assert found[2] == found[int(share < 0.5)]
 
 
-def test_two_groups_have_a_line_each():
-    result = aerotri.adjust(with_sigma([1.0, 1.0, 1.0, 4.0]))
-    usual = result.block.settings.image_sigma_um
-    assert result.sigma0_um == pytest.approx(result.sigma0 * usual)
-    first, most, few = lines_of(result)
-    assert "in the median" in first
-    assert f"{usual:.3g} µm: {result.sigma0 * usual:.2f} µm" in most
-    assert f"{4 * usual:.3g} µm: {result.sigma0 * 4 * usual:.2f} µm" in few
-
-
-def test_many_groups_have_their_range():
-    result = aerotri.adjust(with_sigma(np.linspace(1.0, 3.0, 9)))
-    assert len(lines_of(result)) == 2
-    assert " to " in lines_of(result)[1]
+def test_rays_of_points_have_the_sigma_of_their_camera():
+    calibration = calibration_of(0.6)
+    sigma = matching_sigma_mm(calibration, SigmaOptions())
+    pickets = pickets_of_names(calibration.local.block, np.zeros((2, 3)), [["a", "b"], ["b", "a"]], sigma)
+    np.testing.assert_allclose(pickets.sigma_mm / PIXEL_MM[[0, 1, 1, 0]], SIGMA0 * SIGMA_PX)
+    stated = matching_sigma_mm(calibration, SigmaOptions(matching_sigma_um=2.0))
+    pickets = pickets_of_names(calibration.local.block, np.zeros((2, 3)), [["a", "b"], ["b", "a"]], stated)
+    np.testing.assert_array_equal(pickets.sigma_mm, 2e-3)

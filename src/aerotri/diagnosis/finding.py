@@ -10,7 +10,7 @@ from scipy.special import gammaincc, ndtri
 
 from aerotri.adjustment.ray_status import RayStatus
 from aerotri.results.adjusted_block import AdjustedBlock
-from aerotri.statistics.image_sigma import ImageSigma, image_sigmas
+from aerotri.statistics.stated_sigma import ImageSigma, image_sigmas
 
 Grade = Literal["accepted", "doubtful", "rejected"]
 GRADES: tuple[Grade, ...] = ("accepted", "doubtful", "rejected")

@@ -27,8 +27,8 @@ from aerotri.partition.placing import Place, place_of
 from aerotri.partition.telling import Say, Told
 from aerotri.partition.whole import PARTS, Whole, whole_of
 from aerotri.results.adjusted_block import Outcome
-from aerotri.statistics.image_sigma import sigma0_um
 from aerotri.statistics.model_part import of_parameters
+from aerotri.statistics.stated_sigma import sigma0_um
 from aerotri.statistics.summarise import parameters_of
 
 WORK = "work"

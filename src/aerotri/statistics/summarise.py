@@ -31,12 +31,12 @@ from aerotri.results.normalised import normalised_residuals
 from aerotri.statistics.covariance import Cofactors, cofactors, correlations, orientation_cofactors, total_correlations
 from aerotri.statistics.external_reliability import ray_effects, row_effects
 from aerotri.statistics.held_control import HeldTests, held_tests
-from aerotri.statistics.image_sigma import sigma0_um
 from aerotri.statistics.ray_correlation import ray_correlation
 from aerotri.statistics.reliability import detectable_share, suspected_blunders
 from aerotri.statistics.rig_movements import movement_groups, rig_movements
 from aerotri.statistics.rig_results import mounted_cameras
 from aerotri.statistics.rolling_results import rolling_shutters
+from aerotri.statistics.stated_sigma import sigma0_um
 
 OF_POINTS = ("point", "constraint", position_errors.KIND, photograph_fields.KIND)
 """Kinds of shared parameters that belong to object points or single exposures and not to cameras or flights."""

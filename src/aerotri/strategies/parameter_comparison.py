@@ -37,7 +37,7 @@ from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import format_parameters
 from aerotri.observations import Block, DeviationSettings
 from aerotri.results.parameter_comparison import Accuracy, Choice, ParameterComparison, SetOutcome
-from aerotri.statistics.image_sigma import sigma0_um
+from aerotri.statistics.stated_sigma import sigma0_um
 from aerotri.statistics.summarise import count_observations, effective_redundancy, weighted_sum
 from aerotri.strategies.control_prediction import control_rows, predict_control
 from aerotri.strategies.deviation_estimation import with_estimated_deviations
