@@ -7,7 +7,6 @@ import numpy as np
 from aerotri.diagnosis.finding import Finding, doubt
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.common_motion import CHANCE, CommonMotion
-from aerotri.results.position_errors import CHECK_LEVEL
 
 CAUSES_OF_TILT = "heights of the control points that are wrong along one direction, or another datum of the GNSS"
 CAUSES_OF_TURN = "control points and GNSS in different grids, or a wrong time of the exposures"
@@ -26,7 +25,7 @@ def of_common_motion(adjusted: AdjustedBlock) -> list[Finding]:
     if not said:
         return [Finding("turn and scale of GNSS", _scale(found), "0 within σ", "GNSS and the rest agree", "good")]
     name, expected = "turn and scale of GNSS", "0 within σ"
-    if adjusted.position_errors is not None and adjusted.position_errors.neighbours_p < CHECK_LEVEL:
+    if adjusted.position_errors is not None and adjusted.position_errors.neighbours_agree:
         # errors of GNSS that stay for a while look like a turn of all: they are told by themselves
         return [Finding(name, _scale(found), expected, text, "attention") for text in said]
     return [finding for text in said for finding in doubt(name, _scale(found), expected, "doubtful", text)]

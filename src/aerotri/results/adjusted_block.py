@@ -342,7 +342,8 @@ class AdjustedBlock:
     `deviations` says how much parameters differ between groups of photographs that are tied to one another,
     `ray_correlation` how much neighbouring rays of a photograph err alike, `common_shift` what all observed positions
     are shifted against the control points, `common_motion` what they are turned and scaled,
-    `photograph_fields` how much photographs have smooth errors of their own, `relative` the σ of the shape of the block.
+    `photograph_fields` how much photographs have smooth errors of their own, `relative` the σ of the shape of the
+    block.
     """
 
     block: Block
