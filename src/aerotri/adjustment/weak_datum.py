@@ -17,7 +17,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import qr
+from scipy.linalg import LinAlgError, qr
 
 from aerotri.adjustment.block_motions import WeakMotions, weak_motions
 from aerotri.adjustment.chunk_sums import add_gaps
@@ -53,7 +53,13 @@ def weak_factor(
     at : where the equations were assembled, undamped. factorise : of matrices like that of the equations.
     """
     state, estimator = at
-    motions = weak_motions(system, state, equations.diagonal, WEAK)
+    if not equations.are_numbers:
+        return None
+    try:
+        motions = weak_motions(system, state, equations.diagonal, WEAK)
+    except LinAlgError:
+        # of a block that ran away several motions are one
+        return None
     if motions is None or motions.weakest >= WEAKEST:
         return None
     pulls = _pulls(system, state, estimator, motions)
