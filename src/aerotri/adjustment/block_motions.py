@@ -134,7 +134,11 @@ def weak_motions(system: NormalSystem, state: State, diagonal: np.ndarray, limit
     effects = _rows(system, state, motions, diagonal)
     size, rows = size * np.outer(unit, unit), csr_array(effects.rows @ diags_array(unit))
     weak = _weak((rows.T @ rows).toarray(), size)
-    value, turn = _again(rows @ weak, weak.T @ size @ weak)
+    try:
+        value, turn = _again(rows @ weak, weak.T @ size @ weak)
+    except LinAlgError:
+        # of a block that ran away several motions are one
+        return None
     moving = weak @ turn[:, value < limit]
     moving = moving[:, np.linalg.norm(moving[:7], axis=0) > REAL * np.linalg.norm(moving, axis=0)] * unit[:, None]
     if not moving.shape[1]:

@@ -17,7 +17,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import LinAlgError, qr
+from scipy.linalg import qr
 
 from aerotri.adjustment.block_motions import WeakMotions, weak_motions
 from aerotri.adjustment.chunk_sums import add_gaps
@@ -55,11 +55,7 @@ def weak_factor(
     state, estimator = at
     if not equations.are_numbers:
         return None
-    try:
-        motions = weak_motions(system, state, equations.diagonal, WEAK)
-    except LinAlgError:
-        # of a block that ran away several motions are one
-        return None
+    motions = weak_motions(system, state, equations.diagonal, WEAK)
     if motions is None or motions.weakest >= WEAKEST:
         return None
     pulls = _pulls(system, state, estimator, motions)
