@@ -17,7 +17,7 @@ sys.path.insert(0, str(PROJECT / "tools" / "prove"))
 pytest.importorskip("pyceres")
 
 from league_programs import colmap, dbat, ours, pix4d
-from real_data import into_page
+from real_data import into_page, share5
 
 
 @pytest.fixture(scope="module")
@@ -97,3 +97,11 @@ def test_tables_of_a_page_are_written_between_their_marks(tmp_path):
     assert text.endswith("after\n")
     into_page(page, "one", ["new"])
     assert page.read_text(encoding="utf-8") == text
+
+
+def test_the_head_of_share5_that_looks_down_has_a_focal_length_of_its_own(shared_data, tmp_path):
+    share5(shared_data("share5").parent, tmp_path / "share5")
+    cameras = aerotri.read_block(tmp_path / "share5").cameras
+    assert {camera.name.split("_")[-1]: camera.focal_length_mm for camera in cameras} == {
+        "down": 27.0, "back": 38.0, "front": 38.0, "left": 38.0, "right": 38.0,
+    }  # fmt: skip

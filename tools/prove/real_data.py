@@ -114,18 +114,20 @@ def share5(data: Path, folder: Path) -> Ran | None:
         place / "control_points.csv", *SHARE5.split(),
     )  # fmt: skip
     if ran is not None and ran.code == 0:
-        _set_focal_length(folder / "block.toml", "down", SHARE5_DOWN_MM)
+        set_focal_length(folder / "block.toml", "down", SHARE5_DOWN_MM)
     return ran
 
 
-def _set_focal_length(toml: Path, camera: str, focal_mm: str) -> None:
-    """The focal length of one camera of a block, its interior orientation with it."""
-    lines, inside = toml.read_text(encoding="utf-8").splitlines(), False
+def set_focal_length(toml: Path, head: str, focal_mm: str) -> None:
+    """The focal length of the camera whose name ends with that of a head."""
+    lines, inside, changed = toml.read_text(encoding="utf-8").splitlines(), False, 0
     for number, line in enumerate(lines):
         if line.startswith("["):
-            inside = line.startswith((f"[camera.{camera}]", f"[camera.{camera}.", f'[camera."{camera}"'))
-        elif inside and line.startswith("focal_length_mm"):
-            lines[number] = line.replace("38.0", focal_mm)
+            inside = line.endswith((f'_{head}"]', f".{head}]"))
+        elif inside and line.startswith("focal_length_mm = "):
+            lines[number], changed = f"focal_length_mm = {focal_mm}", changed + 1
+    if changed != 1:
+        raise SystemExit(f"{toml}: {changed} cameras of the head '{head}', not one")
     toml.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
