@@ -33,8 +33,7 @@ NEGLIGIBLE = 4.0
 ratio of 7."""
 
 LENS = "lens:k1+k2+k3+p1+p2"
-FIELD = "collocation:13x9"
-COMMON = ("brown", LENS, "bluh:1-12", "legendre:5x5", FIELD, f"{LENS},{FIELD}")
+COMMON = ("brown", LENS, "bluh:1-12", "legendre:5x5", f"{LENS},collocation:13x9")
 OF_MODEL = {
     "ultracam_d": ("ultracam_d:42-73", "bluh:1-12,ultracam_d:42-73", "ultracam_d:42-73,collocation:13x9"),
     "dmc": ("dmc", "bluh:1-12,dmc:30-41+74-77", "dmc:30-41+74-77,collocation:13x9"),
@@ -42,8 +41,6 @@ OF_MODEL = {
 
 
 OF_SMALL_BLOCKS = ("brown:K1+K2+K3+P1+P2", LENS, "bluh:1-12", "none")
-HOLD_THE_LENS = ("none", FIELD)
-"""Sets that keep the lens as it is given, or near it."""
 FEW_PHOTOGRAPHS = 18
 """Photographs below which only sets of a dozen parameters are tried [C]."""
 
@@ -102,7 +99,7 @@ def sets_to_choose_from(block: Block) -> tuple[Choice, ...]:
 
 
 def candidate_sets(block: Block) -> tuple[Choice, ...]:
-    """The sets worth comparing for the cameras of a block; some hold the lens unless it has start values only."""
+    """The sets worth comparing for the cameras of a block; none among them unless the lens has start values only."""
     models = {block.cameras[k].model for k in set(block.images.camera.tolist())}
     specs: list[str] = list(COMMON)
     for model, own in OF_MODEL.items():
@@ -113,11 +110,11 @@ def candidate_sets(block: Block) -> tuple[Choice, ...]:
 
 
 def _parsed(specs: Sequence[str], block: Block) -> tuple[Choice, ...]:
-    """The sets, where a lens has start values without those that would hold what these image points alone gave."""
+    """The sets, without "none" where a lens has start values: it would hold what these image points alone gave."""
     cameras = [block.cameras[k] for k in set(block.images.camera.tolist())]
     values = [prior for camera in cameras for part in (camera.lens, camera.brown) for prior in part.values()]
     start_only = any(prior.kind == "free" and prior.value for prior in values)
-    return tuple(parse_parameters(spec) for spec in specs if not (start_only and spec in HOLD_THE_LENS))
+    return tuple(parse_parameters(spec) for spec in specs if not (start_only and spec == "none"))
 
 
 def choose(comparison: ParameterComparison) -> Chosen:
