@@ -27,8 +27,9 @@ class Job:
         self._out, self._done, self._begun = out, done, time.monotonic()
         self._stage, self._share, self._error, self._stopped = "starting", None, "", False
         self._seconds: float | None = None
+        # -P: no module from the current folder, where a file json.py of the user's would be run in place of Python's
         self._process = subprocess.Popen(
-            [sys.executable, "-m", module, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            [sys.executable, "-P", "-m", module, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             text=True, encoding="utf-8",
         )  # fmt: skip
         self._thread = threading.Thread(target=self._follow, daemon=True)

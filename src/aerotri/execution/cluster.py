@@ -24,7 +24,7 @@ from distributed.scheduler import KilledWorker
 from aerotri.conventions import InputError
 from aerotri.execution.beginning import method, prepare_copies
 from aerotri.execution.choice import fewer_than
-from aerotri.execution.elsewhere import ONE_THREAD, outcome_in, parcels, perform
+from aerotri.execution.elsewhere import WORKER_VARIABLES, outcome_in, parcels, perform
 from aerotri.execution.work import MOST_TRIES, Ledger, Outcome, R, Report, S, Say, T, Work
 from aerotri.memory import SHARE, available_bytes, refuse_beyond_memory
 
@@ -187,7 +187,7 @@ class Dask:
 
     def _started(self) -> tuple[LocalCluster, Client]:
         """Workers that begin, and who speaks with them."""
-        prepare_copies({**ONE_THREAD, **UNWATCHED}, ("distributed",))
+        prepare_copies({**WORKER_VARIABLES, **UNWATCHED}, ("distributed",))
         cluster = self._local_cluster()
         client = Client(cluster)
         client.register_plugin(_NotInterrupted())
@@ -207,7 +207,7 @@ class Dask:
             try:
                 return LocalCluster(
                     n_workers=self._count, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
-                    silence_logs=logging.CRITICAL, env={**os.environ, **ONE_THREAD, **UNWATCHED}, **memory,
+                    silence_logs=logging.CRITICAL, env={**os.environ, **WORKER_VARIABLES, **UNWATCHED}, **memory,
                 )  # fmt: skip
             except (RuntimeError, OSError) as error:
                 if not left:

@@ -24,11 +24,12 @@ from aerotri.version import __version__
 
 SUFFIX = ".shared"
 """Of the files with what tasks share."""
-ONE_THREAD = {
+WORKER_VARIABLES = {
     "AEROTRI_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1",
-    "OPENCV_FOR_THREADS_NUM": "1",
+    "OPENCV_FOR_THREADS_NUM": "1", "PYTHONSAFEPATH": "1",
 }  # fmt: skip
-"""Environment of a process that does one task at a time beside others."""
+"""Environment of a process that does one task at a time beside others: one thread, and no module from the current
+folder, where a file json.py of the user's would be run in place of Python's."""
 KEPT = 2
 """Shared parts that a process keeps."""
 _kept: OrderedDict[tuple[str, Script | None], Any] = OrderedDict()

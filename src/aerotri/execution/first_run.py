@@ -21,7 +21,7 @@ from typing import Any
 
 from aerotri.compiled import compiled_ahead
 from aerotri.compiled_records import RecordType
-from aerotri.execution.elsewhere import ONE_THREAD
+from aerotri.execution.elsewhere import WORKER_VARIABLES
 from aerotri.execution.threads import thread_count
 
 LISTED = Path(__file__).with_name("first_run.json")
@@ -53,7 +53,7 @@ def compile_ahead() -> int:
                     stdin=subprocess.PIPE,
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.DEVNULL,
-                    env={**os.environ, **ONE_THREAD},
+                    env={**os.environ, **WORKER_VARIABLES},
                 )
             )
     compiled_ahead()

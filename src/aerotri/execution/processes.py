@@ -14,7 +14,7 @@ from typing import Any, Self
 from aerotri.conventions import InputError
 from aerotri.execution.beginning import context, environment_of, prepare_copies
 from aerotri.execution.choice import fewer_than
-from aerotri.execution.elsewhere import ONE_THREAD, outcome_in, parcels, perform
+from aerotri.execution.elsewhere import WORKER_VARIABLES, outcome_in, parcels, perform
 from aerotri.execution.work import MOST_TRIES, Ledger, Outcome, R, Report, S, T, Work
 from aerotri.memory import refuse_beyond_memory
 
@@ -37,7 +37,7 @@ class Processes:
 
     def __enter__(self) -> Self:
         # importing takes seconds: meanwhile the command reads its files
-        prepare_copies(ONE_THREAD)
+        prepare_copies(WORKER_VARIABLES)
         return self
 
     def __exit__(
@@ -133,9 +133,9 @@ class _Worker:
         self.connection, other = begin.Pipe()
         self.task: int | None = None
         self.is_ready = False
-        environment = {**os.environ, **ONE_THREAD}
+        environment = {**os.environ, **WORKER_VARIABLES}
         self._process: BaseProcess = begin.Process(target=_serve, args=(other, environment), daemon=True)
-        with environment_of(ONE_THREAD):
+        with environment_of(WORKER_VARIABLES):
             self._process.start()
         other.close()
 
