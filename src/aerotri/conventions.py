@@ -17,8 +17,10 @@ Systematic image error
 from __future__ import annotations
 
 import contextlib
+import errno
 import math
 import os
+import stat
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -67,6 +69,42 @@ class InputError(Exception):
             place += f":{self.line}"
         text = f"{place}: {self.message}" if place else self.message
         return _printable(f"{text} — {self.remedy}" if self.remedy else text)
+
+
+def real_path(path: FilePath) -> Path:
+    """The absolute path with links followed; links that form a loop stay as they are, and no reader opens them."""
+    return Path(os.path.realpath(path))
+
+
+def regular_file(path: FilePath) -> Path:
+    """The path of a file that can be read from its beginning to its end.
+
+    Raises
+    ------
+    InputError
+        For what is none: a folder, a pipe or device, which may never end, a link that leads nowhere.
+    """
+    path = Path(path)
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError) as error:
+        raise _no_file(path, error) from error
+    if not stat.S_ISREG(mode):
+        kind = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
+        raise InputError(f"is {kind}, not a file", "give a file", path)
+    return path
+
+
+def _no_file(path: Path, error: Exception) -> InputError:
+    code = getattr(error, "errno", None)
+    if code == errno.ELOOP:
+        return InputError("its symbolic links form a loop", "check the path", path)
+    if code == errno.ENOENT and os.path.islink(path):
+        return InputError("is a link to what is not there", "is a drive missing? mount it, or remove the link", path)
+    if code in (errno.ENOENT, errno.ENOTDIR):
+        return InputError("there is no such file", "check the path", path)
+    reason = getattr(error, "strerror", None) or error
+    return InputError(f"cannot be read: {reason}", "check the file and its permissions", path)
 
 
 def counted(number: int, singular: str, plural: str = "") -> str:

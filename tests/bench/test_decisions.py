@@ -92,3 +92,15 @@ def test_row_that_a_full_disk_did_not_take_is_told_and_leaves_nothing(tmp_path, 
         decisions.add(Decision(MARK, "a", "p2", (1.0, 1.0)))
     assert len(decisions.rows) == 1
     assert (tmp_path / NAME).read_bytes() == before
+
+
+def test_what_no_table_can_hold_is_not_written(tmp_path):
+    """A control character, or half of a character out of JSON: nothing could open the block any more."""
+    decisions = Decisions(tmp_path)
+    decisions.add(Decision("off", "", "p1", reason="nul \x00, escape \x1b[31m, half \ud83d, tab \t, end"))
+    for name in ("a\x00", "b\x1b[2J", "c\ud83d", "d" * 1001):
+        with pytest.raises(InputError, match="cannot be a name"):
+            decisions.add(Decision("off", "", name, reason="why"))
+        with pytest.raises(InputError, match="cannot be a name"):
+            decisions.add(Decision("off", name, "p1", reason="why"))
+    assert [one.reason for one in Decisions(tmp_path).rows] == ["nul , escape [31m, half , tab , end"]

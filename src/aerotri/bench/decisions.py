@@ -6,6 +6,7 @@ import contextlib
 import csv
 import io
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -16,7 +17,7 @@ from aerotri.conventions import InputError
 from aerotri.formats.block.journal import ACTIONS, EDIT_COLUMNS, GIVEN, MARK, ON, REMOVE, UNDO, standing_rows
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.files.places import not_written
-from aerotri.formats.text.tables import read_table
+from aerotri.formats.text.tables import CONTROL_CHARACTERS, LONGEST_NAME, SURROGATES, read_table
 from aerotri.spreadsheet import plain_row
 
 NAME = "edits.csv"
@@ -127,7 +128,9 @@ class Decisions:
             raise InputError(f"'{decision.action[:30]}' is no action", f"known are {', '.join(ACTIONS)}")
         if decision.action == UNDO and not self.standing():
             raise InputError("nothing is left to be taken back", "nothing was decided, or all of it was taken back")
-        reason = " ".join(decision.reason.split())[:LONGEST_REASON]
+        for name in (decision.image, decision.point):
+            _refuse_unwritable(name)
+        reason = _on_one_line(decision.reason)[:LONGEST_REASON]
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         row = replace(decision, reason=reason, time=now)
         try:
@@ -143,6 +146,22 @@ class Decisions:
         self.add(Decision(UNDO))
         taken = standing_rows([one.action for one in self._rows[:-1]]) or []
         return self._rows[taken[-1]]
+
+
+def _refuse_unwritable(name: str) -> None:
+    """Refuse a name that could not be read back.
+
+    Raises
+    ------
+    InputError
+    """
+    if len(name) > LONGEST_NAME or re.search(f"{CONTROL_CHARACTERS}|{SURROGATES}", name):
+        raise InputError(f"{_on_one_line(name)[:60]!r} cannot be a name", "names are short texts on one line")
+
+
+def _on_one_line(text: str) -> str:
+    """A text without line breaks, control characters and halves of characters, none of which a table may hold."""
+    return " ".join(re.sub(f"{CONTROL_CHARACTERS}|{SURROGATES}", " ", text).split())
 
 
 def _read(path: Path) -> list[Decision]:

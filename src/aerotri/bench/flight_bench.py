@@ -12,7 +12,7 @@ from typing import Any
 from aerotri.bench.flight_plan import RECORD, FlightRecord, flight_content, read_flight
 from aerotri.bench.flight_request import changed_request, texts_of
 from aerotri.bench.job import Jobs
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 
 OF_BENCH, OF_PLAN, PLAN = "_bench", "_plan", "plan_"
 NUMBERS = (
@@ -53,7 +53,7 @@ class FlightBench:
     """
 
     def __init__(self, folder: Path):
-        self.given = folder.resolve()
+        self.given = real_path(folder)
         is_own = self.given.parent.name.endswith(OF_BENCH)
         self.bench = (
             self.given.parent if is_own else self.given.with_name(self.given.name.removesuffix(OF_PLAN) + OF_BENCH)

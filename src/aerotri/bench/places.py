@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aerotri.bench.records import RECORD
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 from aerotri.formats.files.atomic import atomic_folder
 
 RUN = "run.json"
@@ -63,7 +63,7 @@ def places_of(path: Path) -> Places:
     InputError
         When it is neither.
     """
-    folder = (path.parent if path.name == "block.toml" else path).resolve()
+    folder = real_path(path.parent if path.name == "block.toml" else path)
     if (folder / RECORD).is_file():
         bench = folder.with_name(folder.name.removesuffix(OF_RESULT) + OF_BENCH)
         if folder.parent.name.endswith(OF_BENCH):
@@ -82,7 +82,7 @@ def places_of(path: Path) -> Places:
 
 def photographs_beside(path: Path) -> Path | None:
     """The photographs of the project of `aerotri run` that a block or a result belongs to; None where it has none."""
-    record = path.resolve().parent / RUN
+    record = real_path(path).parent / RUN
     if not record.is_file():
         return None
     try:

@@ -21,6 +21,8 @@ from aerotri.bench.shown import RELOAD
 from aerotri.conventions import InputError
 
 MOST, LONGEST = 10**9, 1000
+LONGEST_ADDRESS = 2000
+"""Characters; a number of thousands of digits is none of ours, and Python refuses to read it."""
 STATIC = Path(__file__).parent / "static"
 KINDS = {".js": "text/javascript", ".css": "text/css"}
 HOSTS = ("127.0.0.1", "localhost")
@@ -180,6 +182,9 @@ class Guard:
             await self._inner(scope, receive, send)
             return
         if scope["type"] != "http":
+            return
+        if len(scope["path"]) > LONGEST_ADDRESS:
+            await PlainTextResponse("The address is too long.", 414, HEADERS)(scope, receive, send)
             return
         _, given, rest = (*scope["path"].split("/", 2), "", "")[:3]
         host = Request(scope).headers.get("host", "").rsplit(":", 1)[0]

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
+from aerotri.conventions import real_path
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder, refuse_missing_photographs
 
@@ -97,7 +98,7 @@ def _tell_free(checked: FreeCheck, as_json: bool, console: Console) -> None:
 
 def folder_name(path: Path) -> str:
     """Name of a block's folder, given itself or its block.toml."""
-    folder = path.resolve()
+    folder = real_path(path)
     return (folder.parent if folder.is_file() else folder).name
 
 

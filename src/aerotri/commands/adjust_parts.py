@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from aerotri.commands.console import Console
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 from aerotri.formats.results.json_text import json_text
 
 
@@ -40,7 +40,7 @@ def run_adjust_parts(
     from aerotri.report.tables.parts import parts_lines
 
     console = Console(quiet=as_json)
-    target = out or Path(f"{path.resolve().name}_result")
+    target = out or Path(f"{real_path(path).name}_result")
     console.progress(compilation_notice())
     found = adjust_parts(
         path, target, robust=robust, geoid=geoid, plots=plots, executor=executor, progress=console.stage

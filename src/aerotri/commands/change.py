@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console, written
+from aerotri.conventions import real_path
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
@@ -22,7 +23,7 @@ def run_change(
     from aerotri.public.change import RECORD, change
 
     console = Console(quiet=as_json)
-    target = out or Path(f"{second.resolve().stem}_change")
+    target = out or Path(f"{real_path(second).stem}_change")
     refuse_foreign_folder(target, RECORD)
     console.stage(compilation_notice() or "comparing", None)
     found = change(
@@ -44,7 +45,7 @@ def run_cloud_change(
     from aerotri.public.cloud_change import RECORD, cloud_change
 
     console = Console(quiet=as_json)
-    target = out or Path(f"{second.resolve().stem}_change")
+    target = out or Path(f"{real_path(second).stem}_change")
     refuse_foreign_folder(target, RECORD)
     found = cloud_change(
         first, second, stable=stable, first_adjustment=adjustments[0], second_adjustment=adjustments[1],

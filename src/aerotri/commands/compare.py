@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.commands.console import Console
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.terrain.settings import ALIGNMENTS, INTERPOLATIONS, Interpolation, Movement
@@ -26,7 +26,7 @@ def run_compare(
         if value not in known:
             raise InputError(f"--{name} '{value}' is not known", f"choose one of {', '.join(known)}")
     console = Console(quiet=as_json)
-    target = out or Path(f"{test.resolve().stem}_comparison")
+    target = out or Path(f"{real_path(test).stem}_comparison")
     refuse_foreign_folder(target, RECORD)
     found = compare(test, control, method=method, align=align, cell=cell, project=project, progress=console.stage)
     for note in found.notes:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.commands.console import Console
+from aerotri.conventions import real_path
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
@@ -35,7 +36,7 @@ def run_crosscheck(source: Path, out: Path | None, as_json: bool) -> int:
 
 
 def _name(source: Path) -> str:
-    folder = source.resolve()
+    folder = real_path(source)
     return (folder.parent if folder.is_file() and folder.suffix == ".toml" else folder).name
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
@@ -53,7 +53,7 @@ def run_deform(source: Path, options: DeformOptions, out: Path | None, plots: bo
     console = Console(quiet=as_json)
     o = options
     o.check()
-    target = out or Path(f"{source.resolve().name.removesuffix('_result')}_deformation")
+    target = out or Path(f"{real_path(source).name.removesuffix('_result')}_deformation")
     refuse_foreign_folder(target, RECORD)
     try:
         result = Adjustment(reopened(source, console))

@@ -7,7 +7,7 @@ from typing import Any
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.results.json_text import json_text
 
@@ -26,7 +26,7 @@ def run_demcor(
     if (pair is None) == (models is None):
         raise InputError("either --pair or --models says which photographs the DEM was made of", "give one of the two")
     chosen(executor)
-    if out.resolve() == dem.resolve():
+    if real_path(out) == real_path(dem):
         raise InputError("source and target are the same", "choose another --out", out)
     refuse_foreign_files(out, overwrite)
     result = Adjustment(reopened(source, console), folder=source)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console, written
 from aerotri.commands.results import reopened
-from aerotri.conventions import counted
+from aerotri.conventions import counted, real_path
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.files.work_place import held
 from aerotri.formats.results.json_text import json_text
@@ -30,7 +30,7 @@ def run_dsm(
     console = Console(quiet=as_json)
     settings.check()
     chosen(executor)
-    target = out or Path(f"{source.resolve().name.removesuffix('_result')}_dsm")
+    target = out or Path(f"{real_path(source).name.removesuffix('_result')}_dsm")
     refuse_foreign_folder(target, RECORD)
     tiles = tiles_beside(target)
     with held(target):

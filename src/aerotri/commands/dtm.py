@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
-from aerotri.conventions import InputError, stated_number
+from aerotri.conventions import InputError, real_path, stated_number
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
@@ -45,7 +45,7 @@ def run_dtm(
     console = Console(quiet=as_json)
     settings.check()
     chosen(executor)
-    target = out or Path(f"{source.resolve().name.removesuffix('_result')}_dtm")
+    target = out or Path(f"{real_path(source).name.removesuffix('_result')}_dtm")
     refuse_foreign_folder(target, RECORD)
     result = Adjustment(reopened(source, console))
     with ExitStack() as stack:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from aerotri.commands.console import Console, written
 from aerotri.commands.results import reopened
-from aerotri.conventions import InputError, counted
+from aerotri.conventions import InputError, counted, real_path
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.files.work_place import held
 from aerotri.formats.results.json_text import json_text
@@ -32,7 +32,7 @@ def run_ortho(
     console = Console(quiet=as_json)
     settings.check()
     chosen(executor)
-    target = out or Path(f"{source.resolve().name.removesuffix('_result')}_ortho")
+    target = out or Path(f"{real_path(source).name.removesuffix('_result')}_ortho")
     refuse_foreign_folder(target, RECORD)
     if layer not in LAYERS:
         raise InputError(f"there is no layer '{layer}'", f"choose one of {', '.join(LAYERS)}")

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from aerotri.commands.console import Console, written
+from aerotri.conventions import real_path
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
@@ -16,7 +17,7 @@ def run_plan(area: str, out: Path | None, asked: dict[str, Any], as_json: bool) 
 
     console = Console(quiet=as_json)
     is_text = area.lstrip().upper().startswith(("POLYGON", "MULTIPOLYGON", "SRID="))
-    target = out or Path("plan" if is_text else f"{Path(area).resolve().stem}_plan")
+    target = out or Path("plan" if is_text else f"{real_path(Path(area)).stem}_plan")
     refuse_foreign_folder(target, RECORD)
     found = plan_flight(area, **asked)
     found.save(target)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console, written
-from aerotri.conventions import InputError, in_digits
+from aerotri.conventions import InputError, in_digits, real_path
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.volume.settings import LAYER, SIGMA
@@ -71,7 +71,7 @@ def run_volume(
 
     console, s = Console(quiet=as_json), sigma_options
     given.check()
-    target = out or Path(f"{given.surface.resolve().stem}_volume")
+    target = out or Path(f"{real_path(given.surface).stem}_volume")
     refuse_foreign_folder(target, RECORD)
     console.progress(compilation_notice())
     try:

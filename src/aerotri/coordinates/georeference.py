@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, real_path
 
 if TYPE_CHECKING:
     from pyproj import CRS, Transformer
@@ -241,9 +241,9 @@ def _geoid_file(path: Path, crs: str, whole: CRS) -> Transformer:
         )
     if not path.is_file():
         raise InputError(f"the geoid grid {path} is missing", "give an existing file: --geoid FILE")
-    if "," in str(path.resolve()) or '"' in str(path.resolve()):
+    if "," in str(real_path(path)) or '"' in str(real_path(path)):
         raise InputError(f"PROJ cannot open {path}: its name has a comma or a quotation mark", "rename the file")
-    shift = f'+proj=vgridshift +grids="{path.resolve()}" +multiplier=1'
+    shift = f'+proj=vgridshift +grids="{real_path(path)}" +multiplier=1'
     units = "+step +proj=unitconvert +xy_in=deg +xy_out=rad +step {} +step +proj=unitconvert +xy_in=rad +xy_out=deg"
     try:
         return Transformer.from_pipeline("+proj=pipeline " + units.format(shift))

@@ -18,7 +18,7 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 
 MAIN, OURS = "__main__", "aerotri."
 """Names of the module that a script is where it runs, and of what every worker has."""
@@ -56,7 +56,7 @@ def script_of(pickled: Sequence[bytes], function: Any) -> Script | None:
     named = any(MAIN.encode() in content for content in pickled)
     if (is_ours and not named) or file is None or not Path(file).is_file():
         return None
-    path = Path(file).resolve()
+    path = real_path(Path(file))
     script = Script(path, _mark_of(path))
     # a record that a worker sends back is one of the module that it made
     sys.modules[script.module] = main
@@ -92,7 +92,7 @@ class _Unpickler(pickle.Unpickler):
 
 def _is_main(script: Script) -> bool:
     file = getattr(sys.modules[MAIN], "__file__", None)
-    return file is not None and Path(file).resolve() == script.path
+    return file is not None and real_path(Path(file)) == script.path
 
 
 def _load(script: Script) -> None:

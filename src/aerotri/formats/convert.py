@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, regular_file
 from aerotri.formats.assembly.oriented import OrientedBlock, oriented_block
 from aerotri.formats.assembly.parts import Reading
 from aerotri.formats.assembly.placing import in_axes_at, in_local_frame
@@ -121,8 +121,8 @@ def detect_format(path: FilePath) -> str:
         When there is nothing, or it is none of those known.
     """
     path = Path(path)
-    if not path.exists():
-        raise InputError("there is no such file or folder", "check the path", path)
+    if not path.is_dir():
+        regular_file(path)
     for name, recognises in RECOGNISERS.items():
         if recognises(path):
             return name

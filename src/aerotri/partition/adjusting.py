@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 from aerotri.execution.work import Executor, Work
 from aerotri.formats.block.folder import read_block, read_photographs
 from aerotri.observations import Block
@@ -69,7 +69,7 @@ def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSet
     work = out / WORK
     try:
         names, origin, place = _shared_photographs(sources, settings.geoid)
-        tasks = [PartTask(p.name, p.resolve(), (work / p.name).resolve()) for p in sources]
+        tasks = [PartTask(p.name, real_path(p), real_path(work / p.name)) for p in sources]
         told = Told(executor, say)
         told.stage = "reading"
         facts = told.run(_reading(Setting(names, origin, place), tasks, work))
@@ -130,7 +130,7 @@ def _with_sigma(
     )  # fmt: skip
     model = model_part_of(course, place, first, ended.status, sigma0, photographs)
     course.begin("tables")
-    ending = Ending(place.at, outcome, (out / PARTS).resolve(), every, place_of_block, model.part, model.shared)
+    ending = Ending(place.at, outcome, real_path(out / PARTS), every, place_of_block, model.part, model.shared)
     written: list[Written] = course.run(write_part, ending)
     parameters = parameters_of(common.labels, place.at.shared, corner.inverse, common.weighted, sigma0)
     if model.shared is not None:

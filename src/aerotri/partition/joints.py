@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from aerotri.adjustment.sparse_cholesky import PIVOT_LIMIT, NotPositiveDefiniteError
+from aerotri.conventions import real_path
 from aerotri.execution.work import Executor, Work
 from aerotri.partition.common import Common, Left
 from aerotri.partition.joint_tasks import Above, Joined, JointTask, follow, invert, join
@@ -138,7 +139,7 @@ class Joints:
         return out
 
     def _work(self, joint: int) -> Path:
-        return (self._folder / f"joint_{joint:04d}").resolve()
+        return real_path(self._folder / f"joint_{joint:04d}")
 
 
 def _known(above: Above | None) -> Above:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, counted
+from aerotri.conventions import FilePath, InputError, counted, real_path
 from aerotri.public.models import check_crs
 from aerotri.public.places import place_in_words
 from aerotri.public.run_steps import DSM, DTM, RESULT
@@ -135,7 +135,7 @@ def names_of(epochs: Epochs) -> tuple[str, str]:
     labels = [one.surface.label for one in epochs]
     paths = [one.surface.path for one in epochs]
     if labels[0] == labels[1] and paths[0] is not None and paths[1] is not None:
-        parts = [path.resolve().parts for path in (paths[0], paths[1])]
+        parts = [real_path(path).parts for path in (paths[0], paths[1])]
         for count in range(2, min(map(len, parts)) + 1):
             if parts[0][-count] != parts[1][-count]:
                 labels = ["/".join(own[-count:]) for own in parts]

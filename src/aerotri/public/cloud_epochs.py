@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, real_path
 from aerotri.public.dense import RECORD as DENSE
 from aerotri.public.models import check_crs
 from aerotri.public.stated import StatedAdjustment
@@ -98,7 +98,7 @@ def labels_of(first: CloudEpoch, second: CloudEpoch, given: Sequence[Any]) -> tu
     labels = (first.label, second.label)
     if labels[0] != labels[1] or any(isinstance(one, np.ndarray) for one in given):
         return labels
-    parts = [Path(one).resolve().parts for one in given]
+    parts = [real_path(Path(one)).parts for one in given]
     for count in range(2, min(map(len, parts)) + 1):
         if parts[0][-count] != parts[1][-count]:
             return "/".join(parts[0][-count:]), "/".join(parts[1][-count:])

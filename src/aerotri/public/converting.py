@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, counted
+from aerotri.conventions import FilePath, InputError, counted, real_path
 from aerotri.observations import Block
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.blocks import ReadBlock, read, text_of_path
@@ -104,7 +104,7 @@ def _write_tables(block: Block, target: Path, tables: Tables) -> tuple[str, ...]
 
 def name_of_target(target: Path, to: Target) -> str:
     """A block is called as the folder it is written to."""
-    return target.resolve().name if to == "block" else ""
+    return real_path(target).name if to == "block" else ""
 
 
 def refuse_target(source: str, target: Path, to: str, overwrite: bool) -> None:
@@ -118,7 +118,7 @@ def refuse_target(source: str, target: Path, to: str, overwrite: bool) -> None:
 
     if to not in TARGETS:
         raise InputError(f"'{to}' is not a format that is written", f"known are {', '.join(TARGETS)}")
-    if source and target.resolve() == Path(source).resolve():
+    if source and real_path(target) == real_path(Path(source)):
         raise InputError("source and target are the same", "choose another target", target)
     if to in FOLDER_TARGETS:
         refuse_foreign_entries(target, FOLDER_TARGETS[to], overwrite)
@@ -139,7 +139,7 @@ def refuse_no_project(source: str, target: Path, to: str) -> None:
         raise InputError(f"--in-place is not possible for '{to}'", f"it is for {', '.join(UPDATERS)}")
     if not RECOGNISERS[to](target):
         raise InputError(f"is no {to} project to bring up to date", "give its folder, or leave --in-place out", target)
-    if source and target.resolve() == Path(source).resolve():
+    if source and real_path(target) == real_path(Path(source)):
         raise InputError("source and target are the same", "give the result of the adjustment as source", target)
 
 

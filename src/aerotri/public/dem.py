@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, real_path
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.files.spool import Spool
 from aerotri.public.adjustment import Adjustment
@@ -106,7 +106,7 @@ class CorrectedDem:
             When the file is that of the DEM before, is there already, or cannot be written.
         """
         target = Path(out)
-        if self.source is not None and target.resolve() == self.source.resolve():
+        if self.source is not None and real_path(target) == real_path(self.source):
             raise InputError("source and target are the same", "choose another name", target)
         refuse_foreign_files(target, overwrite)
         _write(target, self)

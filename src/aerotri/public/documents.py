@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, real_path
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.change import RECORD as CHANGE
 from aerotri.public.change import MeasuredChange
@@ -235,7 +235,7 @@ def _places(folder: Path | None, content: Mapping[str, Any]) -> list[Path]:
 
     if folder is None:
         return []
-    around = folder.resolve().parent
+    around = real_path(folder).parent
     sigma = content.get("sigma")
     named = str(sigma.get("adjustment") or "") if isinstance(sigma, dict) else ""
     places = [around / RESULT] if (around / RECORD).is_file() else []

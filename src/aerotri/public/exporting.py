@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal, cast, get_args
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, counted
+from aerotri.conventions import FilePath, InputError, counted, real_path
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.change import MeasuredChange
 from aerotri.public.cloud_change import MeasuredCloudChange
@@ -138,9 +138,9 @@ def _origin(result: object, options: DocumentOptions, target: Path) -> str:
     camera = f", camera {options.camera}" if options.camera else ""
     if not isinstance(result, str | os.PathLike):
         return f"{result!r}{camera}"
-    folder = Path(result).resolve()
+    folder = real_path(Path(result))
     try:
-        return os.path.relpath(folder, target.resolve()) + camera
+        return os.path.relpath(folder, real_path(target)) + camera
     except ValueError:  # on another drive
         return f"{folder}{camera}"
 
@@ -291,7 +291,7 @@ def _beside(result: Adjustment) -> Iterator[Asset]:
     """Surfaces, orthophoto and volume of the project of `aerotri run` that the result belongs to."""
     from aerotri.public.run_steps import RECORD
 
-    project = None if result.folder is None else result.folder.resolve().parent
+    project = None if result.folder is None else real_path(result.folder).parent
     if project is not None and (project / RECORD).is_file():
         for name in BESIDE:
             yield from _described(project / name, f"folder of {name}", f"{name}/")

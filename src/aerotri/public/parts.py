@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, real_path
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.blocks import request_of
@@ -280,7 +280,7 @@ def convert_request_parts(
 
     _refuse_few(parts)
     refuse_foreign_folder(target)
-    request = replace(request, name=request.name or target.resolve().name)
+    request = replace(request, name=request.name or real_path(target).name)
     with stage_report(progress) as report, room_beside(target) as room, atomic_folder(target) as place:
         report.stage("reading photographs", None)
         source = read_in_pieces(request, room / "head")
@@ -410,7 +410,7 @@ def adjust_parts(
     from aerotri.partition.whole import PARTS, write_whole
     from aerotri.public.folders import refuse_foreign_folder
 
-    target, grid = Path(out), None if geoid is None else Path(geoid).resolve()
+    target, grid = Path(out), None if geoid is None else real_path(Path(geoid))
     refuse_foreign_folder(target, "adjustment.json")
     chosen(executor)
     tables = ("parameters.csv", "control.csv", "check.csv", "work_list.csv")

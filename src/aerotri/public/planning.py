@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, real_path
 from aerotri.observations import Block
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.projects import project_of
@@ -287,7 +287,7 @@ def _request(given: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(kept[name], str | os.PathLike):
             text = os.fspath(kept[name])
             is_file = text not in ("auto", *PRESETS) and _is_there(text)
-            kept[name] = str(Path(text).resolve()) if is_file else text
+            kept[name] = str(real_path(Path(text))) if is_file else text
     return kept
 
 

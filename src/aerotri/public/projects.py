@@ -9,7 +9,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, real_path
 
 if TYPE_CHECKING:
     from aerotri.observations.project import Project
@@ -86,8 +86,8 @@ def _of_place(place: Path) -> Iterator[Project]:
     for toml in (folder / "block" / "block.toml", folder / "block.toml", folder / RESULT / "block" / "block.toml"):
         if place.is_dir() and toml.is_file():
             yield _of_toml(toml)
-    toml = folder.resolve().parent / RESULT / "block" / "block.toml"
-    if (folder.resolve().parent / RECORD).is_file() and toml.is_file():
+    toml = real_path(folder).parent / RESULT / "block" / "block.toml"
+    if (real_path(folder).parent / RECORD).is_file() and toml.is_file():
         yield _of_toml(toml)
     for name in RECORDS:
         content = _read(folder / name)

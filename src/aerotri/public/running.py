@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from aerotri.conventions import FilePath
+from aerotri.conventions import FilePath, real_path
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.execution.opening import opened
 from aerotri.public.blocks import Sigmas
@@ -161,7 +161,7 @@ def run(
     of_dense = {name: value for name, value in settings["volume"].items() if name != "layer"}
     settings["dense_volume"] = of_dense | settings.get("dense_volume", {})
     place = Path(source)
-    target = Path(f"{place.resolve().name}_project" if out is None else out)
+    target = Path(f"{real_path(place).name}_project" if out is None else out)
     refuse_no_folder(target)
     with stage_report(progress) as report:
         steps = steps_of(place, target, settings, dense)

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aerotri.conventions import FilePath
+from aerotri.conventions import FilePath, real_path
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.results import open_result
 
@@ -78,4 +78,4 @@ class StatedAdjustment:
         """Whether both are one folder, or one result."""
         if other is None or isinstance(self.source, Adjustment) or isinstance(other.source, Adjustment):
             return other is not None and self.source is other.source
-        return Path(self.source).resolve() == Path(other.source).resolve()
+        return real_path(Path(self.source)) == real_path(Path(other.source))

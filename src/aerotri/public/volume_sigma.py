@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, real_path
 from aerotri.public.dense import RECORD as DENSE
 from aerotri.public.dense import DenseSurface
 from aerotri.public.models import check_crs
@@ -119,7 +119,7 @@ class MeasuredSurface:
         one, two = self.surface.path, other.surface.path
         if one is None or two is None:
             return self.surface.source is other.surface.source
-        return one.resolve() == two.resolve()
+        return real_path(one) == real_path(two)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, regular_file
 from aerotri.rasters.quiet import quietly
 from aerotri.vectors.geojson import LARGEST_M
 
@@ -145,6 +145,7 @@ class RasterReader:
         import rasterio
 
         self.path, self.band = Path(path), band
+        regular_file(self.path)
         with _told(self.path, "is no raster", "give a GeoTIFF"), quietly():
             self._file = rasterio.open(self.path)
         try:

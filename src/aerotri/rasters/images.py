@@ -19,7 +19,7 @@ from rasterio.enums import ColorInterp, MaskFlags, Resampling
 from rasterio.errors import RasterioError
 from rasterio.transform import Affine
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, real_path
 from aerotri.rasters.grids import window_of
 from aerotri.rasters.photograph_settings import COMPRESSION
 from aerotri.rasters.quiet import quietly
@@ -141,7 +141,7 @@ def open_photograph(path: FilePath) -> Generator[Photograph]:
     if not path.is_file():
         raise InputError("there is no such file", "give a photograph, TIFF or JPEG", path)
     with _told(path), rasterio.Env(**SETTINGS):
-        dataset = rasterio.open(path.resolve(), driver=_driver(path))
+        dataset = rasterio.open(real_path(path), driver=_driver(path))
     with dataset:
         with _told(path):
             bits = _bits(path, dataset)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, regular_file
 from aerotri.rasters.grids import CACHE_BYTES, TILE, Grid, window_of
 from aerotri.rasters.quiet import quietly
 from aerotri.rasters.room import raise_full_disk
@@ -140,6 +140,7 @@ def bounds_of(path: Path) -> tuple[float, float, float, float]:
     import rasterio
     from rasterio.errors import RasterioError
 
+    regular_file(path)
     try:
         with quietly(), rasterio.open(path) as file:
             t, bounds = file.transform, file.bounds

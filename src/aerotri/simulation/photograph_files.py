@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.files.places import existing_folder
 from aerotri.formats.results.json_text import write_json
@@ -149,7 +149,7 @@ def _write_tiff(scene: Scene, image: int, path: Path, report: Report) -> None:
 def _refuse_without_room(scene: Scene, chosen: Sequence[int], folder: Path) -> None:
     """Photographs are as large as their pixels, 16 bit each."""
     needed = sum(2.0 * float(np.prod(scene.camera(image).nominal.size_px, dtype=float)) for image in chosen)
-    free = shutil.disk_usage(existing_folder(folder.resolve())).free
+    free = shutil.disk_usage(existing_folder(real_path(folder))).free
     if needed > free:
         raise InputError(
             f"{len(chosen)} photographs need {needed / 2**30:.3g} GiB, {free / 2**30:.3g} GiB of the disk are free",

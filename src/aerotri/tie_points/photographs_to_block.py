@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.adjustment.parallel import thread_count
-from aerotri.conventions import InputError, mm_from_px
+from aerotri.conventions import InputError, mm_from_px, real_path
 from aerotri.coordinates.blocks import transform_block
 from aerotri.diagnosis.control_points import doubts_with_orientation
 from aerotri.execution.work import Workplace
@@ -300,7 +300,7 @@ def _bare_block(
     count = int(keep.sum())
     width = len(str(len(tracks)))
     return Block(
-        name=photographs.paths[0].resolve().parent.name,
+        name=real_path(photographs.paths[0]).parent.name,
         cameras=cameras,
         images=Images(photographs.names[keep], photographs.camera[keep], np.full(count, ""), no_sigma(count),
                       no_sigma(count), photographs.time_column(keep)),

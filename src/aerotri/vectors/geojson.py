@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, regular_file
 
 LARGEST_M = 1e12
 """No coordinate lies farther out; numbers beyond lose their decimals, and squares of them overflow."""
@@ -48,6 +48,7 @@ def crs_of_name(name: str) -> dict[str, Any]:
 
 
 def _content(path: Path) -> Any:
+    regular_file(path)
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 from aerotri.vectors.geojson import LARGEST_M
 
 ENVELOPE_BYTES = (0, 32, 48, 48, 64)
@@ -54,7 +54,7 @@ def read_geopackage(path: Path) -> Iterator[tuple[str, int | None, Iterator[GeoP
     if not path.is_file():
         raise InputError("there is no such file", "give a GeoPackage", path)
     try:
-        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as database:
+        with closing(sqlite3.connect(f"{real_path(path).as_uri()}?mode=ro", uri=True)) as database:
             _limit(database)
             for table, column, srs in _layers(database, path):
                 yield table, srs, _rows(database, table, column, path)

@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
-from aerotri.conventions import InputError, in_digits
+from aerotri.conventions import InputError, in_digits, regular_file
 from aerotri.rasters.grids import Grid, rasterise
 from aerotri.vectors.crs import vector_system
 from aerotri.vectors.polygons import (
@@ -268,6 +268,7 @@ def read_boundary(source: str, epsg: int | None = None) -> Boundary:
             return found if found.piles else replace(found, polygon_name=names[0])
         numbered = [own or str(number) for number, own in enumerate(names, start=1)]
         return boundary_of_piles(list(zip(numbered, polygons, strict=True)), path.name, note, path)
+    regular_file(path)
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, regular_file
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, RayList
 from aerotri.formats.foreign.bingo import is_bingo, read_bingo
 from aerotri.formats.foreign.ign import is_ign_app, is_ign_mes, is_ign_opk, read_ign_app, read_ign_mes, read_ign_opk
@@ -112,8 +112,8 @@ def kind_of(path: Path, kinds: Kinds) -> str | None:
     InputError
         When there is no such file.
     """
-    if not path.exists():
-        raise InputError("there is no such file or folder", "check the path", path)
+    if not path.is_dir():
+        regular_file(path)
     return next((name for name, (recognises, _) in kinds.items() if recognises(path)), None)
 
 

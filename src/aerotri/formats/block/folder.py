@@ -8,6 +8,7 @@ lens parameters k1 k2 p1 p2 k3 as `[camera.<name>.brown]` holds Brown's. Of scan
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aerotri.conventions import RADIANS_PER, FilePath, InputError
+from aerotri.conventions import RADIANS_PER, FilePath, InputError, real_path
 from aerotri.formats.block.extras import edits_of, read_constraints
 from aerotri.formats.block.journal import read_journal, with_given, with_marks
 from aerotri.formats.block.logo import with_logo
@@ -133,7 +134,7 @@ def block_of(tables: BlockTables, rays: Rays) -> Block:
         rays.image_points, names, control, journal, images, cameras, tables.fits, default.image_sigma_um * 1e-3
     )
     block = Block(
-        name=folder.resolve().name if model.name is None else model.name,
+        name=real_path(folder).name if model.name is None else model.name,
         cameras=cameras,
         images=images,
         points=points,
@@ -205,7 +206,7 @@ def _required_table(folder: Path, name: str) -> Path:
 
 def table_file(folder: Path, name: str) -> Path | None:
     """The table of a name as .csv or .parquet; None where there is none."""
-    found = [path for path in (folder / f"{name}.csv", folder / f"{name}.parquet") if path.exists()]
+    found = [path for path in (folder / f"{name}.csv", folder / f"{name}.parquet") if os.path.lexists(path)]
     if len(found) > 1:
         raise InputError(f"{name}.csv and {name}.parquet are both there", "remove one of them", folder / name)
     return found[0] if found else None

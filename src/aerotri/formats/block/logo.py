@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Protocol
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 from aerotri.observations.project import Project
 
 ENDINGS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".svg": "SVG"}
@@ -62,7 +62,7 @@ def _inside(folder: Path, name: str, refuse: Callable[..., InputError]) -> Path:
     if _leads_out(name):
         raise refuse("is outside the block folder")
     path = folder / name
-    if not path.resolve().is_relative_to(folder.resolve()):
+    if not real_path(path).is_relative_to(real_path(folder)):
         raise refuse("is outside the block folder")
     if not path.is_file():
         raise refuse("is missing")

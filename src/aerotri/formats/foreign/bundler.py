@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, counted
+from aerotri.conventions import FilePath, InputError, counted, real_path
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import Reading, texts
 from aerotri.formats.files.atomic import atomic_folder
@@ -175,7 +175,7 @@ def read_bundler(path: FilePath, pixel_um: float = 1.0, size_px: tuple[int, int]
     cameras = tuple(_camera(i, row, sizes[i], pixel_um) for i, row in enumerate(inner.tolist()))
     adjustment = AdjustmentSettings(additional_parameters=(("lens", WRITTEN_LENS),), datum="minimal")
     block = Block(
-        name=path.resolve().parent.name,
+        name=real_path(path).parent.name,
         cameras=cameras,
         images=images,
         points=used.astype(str),

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import InputError, counted, mm_from_px
+from aerotri.conventions import InputError, counted, mm_from_px, real_path
 from aerotri.formats.foreign.colmap_arrays import FILES, write_bare
 from aerotri.formats.foreign.colmap_binary import check_binary_model
 from aerotri.formats.foreign.colmap_cameras import MOST_PIXELS, read_camera
@@ -105,7 +105,7 @@ def block_without_rays(model: Any, ids: list[int], pixel_um: float, folder: Path
     _check_images(images, folder)
     nothing = np.zeros(0, np.int64)
     return Block(
-        name=folder.resolve().name,
+        name=real_path(folder).name,
         cameras=cameras,
         images=images,
         points=np.zeros(0, "<U1"),

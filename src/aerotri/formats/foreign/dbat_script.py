@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 from aerotri.formats.text.tables import Columns, Table, read_table
 from aerotri.formats.text.xml_text import read_xml, text_of
 
@@ -61,7 +61,7 @@ class Script:
         InputError
         """
         try:
-            path = (self.base / name.replace("$HERE", str(self.path.parent))).resolve()
+            path = real_path(self.base / name.replace("$HERE", str(self.path.parent)))
             there = path.is_file()
         except (OSError, ValueError) as error:
             raise InputError(f"'{name[:60]}' is no file name", "name a file beside the script", self.path) from error
@@ -101,7 +101,7 @@ def read_script(path: Path) -> Script:
     ------
     InputError
     """
-    file = _script_file(path).resolve()
+    file = real_path(_script_file(path))
     root = read_xml(file)
     source = one(root, "input", file)
     base = source.get("base_dir", "$HERE").replace("$HERE", str(file.parent))

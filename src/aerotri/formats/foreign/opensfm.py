@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import FilePath, counted, mm_from_px, px_from_mm
+from aerotri.conventions import FilePath, counted, mm_from_px, px_from_mm, real_path
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import Reading, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_folder
@@ -108,7 +108,7 @@ def read_opensfm(path: FilePath, pixel_um: float = 1.0) -> Reading:
     datum = "minimal" if observed is None else "control"
     measured = _image_points(tracks, cameras, images.camera)
     block = Block(
-        name=path.resolve().parent.name,
+        name=real_path(path).parent.name,
         cameras=cameras,
         images=images,
         points=texts(names)[used],

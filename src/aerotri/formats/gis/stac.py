@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, real_path
 from aerotri.deformation.footprints import Footprints
 from aerotri.formats.results.json_text import number_or_none
 from aerotri.results.adjusted_block import AdjustedBlock
@@ -179,5 +179,5 @@ def _outcome(adjusted: AdjustedBlock) -> dict[str, Any]:
 def _asset(asset: Asset, place: Path) -> dict[str, Any]:
     ending = asset.path.suffix.lower()
     media = MEDIA_TYPES.get(ending, "application/octet-stream") + (CLOUD_OPTIMISED if asset.cloud_optimised else "")
-    href = Path(os.path.relpath(asset.path.resolve(), place.resolve())).as_posix()
+    href = Path(os.path.relpath(real_path(asset.path), real_path(place))).as_posix()
     return {"href": href, "title": asset.title, "type": media, "roles": [ROLES.get(ending, "data")]}

@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, regular_file
 from aerotri.formats.foreign.colmap_binary import mapped
 
 HEADER_BYTES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375}
@@ -58,7 +58,7 @@ def check_las(path: Path) -> None:
     ------
     InputError
     """
-    raw = mapped(path)
+    raw = mapped(regular_file(path))
     try:
         header = _header(raw, path)
         laszip = _laszip_of(raw, header, path)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, regular_file
 from aerotri.spreadsheet import with_formula
 
 UTF8_REMEDY = "save the table as UTF-8"
@@ -65,6 +65,7 @@ def read_bytes(path: Path) -> bytes:
     InputError
         When it cannot be read.
     """
+    regular_file(path)
     try:
         return without_mark(path.read_bytes())
     except OSError as error:

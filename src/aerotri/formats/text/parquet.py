@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, regular_file
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -26,6 +26,7 @@ def load_parquet(path: Path) -> pa.Table:
     """
     from pyarrow import parquet
 
+    regular_file(path)
     with _told(path):
         return parquet.ParquetFile(path).read()
 
@@ -41,6 +42,7 @@ def batches(path: Path, rows: int) -> Iterator[pa.Table]:
     import pyarrow as pa
     from pyarrow import parquet
 
+    regular_file(path)
     with _told(path):
         # without a buffer a whole column of a row group is read at once
         file = parquet.ParquetFile(path, buffer_size=1 << 20, pre_buffer=False)

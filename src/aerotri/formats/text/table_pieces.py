@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from aerotri.conventions import regular_file
 from aerotri.formats.text.csv_text import csv_text_of, unreadable, without_mark
 from aerotri.formats.text.tables import Columns, Table, check_header, checked_table, parse_rows, text_names
 
@@ -40,6 +41,7 @@ def _csv_pieces(path: Path, columns: Columns) -> Iterator[Table]:
 
 def _whole_lines(path: Path) -> Iterator[bytes]:
     """The bytes of a file in pieces that end with a line; one piece, maybe without any, at least."""
+    regular_file(path)
     try:
         with path.open("rb") as file:
             raw = without_mark(file.read(PIECE_BYTES)) + file.readline()

@@ -39,6 +39,8 @@ LARGEST_FORMAT_PX = 1e7
 SMALLEST_POSITIVE = 1e-12
 """A σ or a focal length, which has to be greater than 0, is at least this in any unit, or its weight overflows."""
 CONTROL_CHARACTERS = r"[\x00-\x1f\x7f]"
+SURROGATES = r"[\ud800-\udfff]"
+"""Halves of characters, as JSON may hold them: no file can be written with one."""
 
 
 @dataclass(frozen=True)
