@@ -33,7 +33,7 @@ def deformed(result, out, capsys, plots=False, **options):
 
 def raster(path):
     with RasterReader(path) as reader:
-        return reader.read(0, 0, reader.grid.rows, reader.grid.columns).astype(float), reader.grid, reader.epsg
+        return reader.read(0, 0, reader.grid.rows, reader.grid.columns).astype(float), reader.grid, reader.plan
 
 
 def test_pair_as_flown(erring_result, erring, tmp_path, capsys):
@@ -75,8 +75,8 @@ def test_stated_end_lap_in_both_variants(erring_result, tmp_path, capsys):
         assert content["variant"] == variant
         assert content["h_over_b"] == pytest.approx(4.46, abs=0.005)
         assert content["gsd_m"] == pytest.approx(0.09)
-        values, grid, epsg = raster(tmp_path / variant / "dZ.tif")
-        assert epsg is None
+        values, grid, system = raster(tmp_path / variant / "dZ.tif")
+        assert system == ""
         assert (grid.cell_x, grid.cell_y) == (10.0, 10.0)
         found[variant] = values
     assert np.nanmax(np.abs(found["free"] - found["absorbed"])) > 0.1

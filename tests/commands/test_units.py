@@ -124,7 +124,7 @@ def test_a_plan_in_feet_needs_the_unit_of_the_heights(tmp_path):
         with MetricReader(tmp_path / "feet.tif") as reader:
             assert units_of(RasterReader(tmp_path / "feet.tif")).plan == "US survey foot"
             # NAD83 has a UTM of its own
-            assert reader.epsg == 26910
+            assert reader.plan == "EPSG:26910"
             assert reader.grid.cell_x == pytest.approx(10.0 * SURVEY_FOOT, rel=0.02)
             values = reader.read(0, 0, reader.grid.rows, reader.grid.columns)
             assert np.nanmedian(values) == pytest.approx(height, rel=1e-7)

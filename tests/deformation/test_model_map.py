@@ -181,7 +181,7 @@ def test_sampling_a_raster(tmp_path):
     z[3, 4] = np.nan
     write_raster(tmp_path / "z.tif", z, GRID, "EPSG:25832")
     with RasterReader(tmp_path / "z.tif") as reader:
-        assert reader.epsg == 25832
+        assert reader.plan == "EPSG:25832"
         column, row = np.array([0.0, 9.0, 7.3, 2.5, 3.5, -0.1, 5.0]), np.array([0.0, 11.0, 8.9, 7.0, 2.5, 2.0, 11.1])
         found = reader.sample(GRID.x(column), GRID.y(row))
         expected = 5.0 + 2.0 * column - 3.0 * row

@@ -85,7 +85,7 @@ def test_a_surface_of_an_array_is_kept(tmp_path):
     np.testing.assert_array_equal(again.z, z)
     assert again.grid == Grid(3, 4, 10.0, 50.0, 2.0, 2.0)
     with again.reader() as one, surface.reader() as other:
-        assert one.epsg == other.epsg == 32632
+        assert one.plan == other.plan == "EPSG:32632"
     with pytest.raises(InputError, match="exists already"):
         surface.save(path)
     with_sigma = aerotri.Surface.of_array(z, left=10.0, top=50.0, cell=2.0, sigma=np.full_like(z, 0.5))

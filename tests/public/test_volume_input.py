@@ -324,7 +324,7 @@ def test_heights_in_feet_are_in_the_system_of_their_datum(tmp_path, vertical):
     assert metric.summary["crs"] == f"{CRS}+5703"
     with MetricReader(metric.thickness.path) as reader:
         assert reader.note == ""
-        assert reader.crs_code == f"{CRS}+5703"
+        assert reader.system == f"{CRS}+5703"
     assert np.nanmax(metric.thickness.z) == pytest.approx(HEIGHT, abs=0.3)
 
 

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from aerotri.conventions import InputError
-from aerotri.coordinates.georeference import read_crs
-
 
 @dataclass(frozen=True)
 class CrsNames:
@@ -15,7 +12,7 @@ class CrsNames:
     Parameters
     ----------
     name : of the system in plan; '' for local coordinates and where it is not known.
-    code : as given.
+    code : as given, '' of a system without one.
     vertical : name of the system of the heights; '' where none is named.
     """
 
@@ -29,15 +26,19 @@ def crs_names(crs: str) -> CrsNames:
 
     Parameters
     ----------
-    crs : 'local', 'EPSG:n' or 'EPSG:n+m'.
+    crs : 'local', or see `crs_text`.
     """
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError
+
     if crs in ("", "local"):
         return CrsNames("", crs, "")
     try:
-        whole = read_crs(crs)
-    except InputError:
+        whole = CRS.from_user_input(crs)
+    except CRSError:
         return CrsNames("", crs, "")
+    code = crs if crs.upper().startswith("EPSG:") else ""
     if whole.is_compound:
         plan, heights = whole.sub_crs_list[:2]
-        return CrsNames(plan.name, crs, heights.name)
-    return CrsNames(whole.name, crs, "")
+        return CrsNames(plan.name, code, heights.name)
+    return CrsNames(whole.name, code, "")

@@ -84,12 +84,12 @@ class NumberMap:
         return number[np.ix_(at_row - at_row[0], at_column - at_column[0])]
 
 
-def read_polygons(path: Path, epsg: int | None = None) -> PolygonMap:
+def read_polygons(path: Path, crs: str = "") -> PolygonMap:
     """Polygons of models from GeoJSON or GeoPackage.
 
     Parameters
     ----------
-    epsg : code of the DEM's CRS, which they are brought to; None when not known.
+    crs : of the DEM, which they are brought to, see `crs_text`; '' where not known.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def read_polygons(path: Path, epsg: int | None = None) -> PolygonMap:
     """
     found: dict[tuple[str, str], int] = {}
     shapes, bounds = [], []
-    features, note = polygon_features(path, epsg)
+    features, note = polygon_features(path, crs)
     for number, (properties, polygon) in enumerate(features, start=1):
         names = str(properties.get("left") or ""), str(properties.get("right") or "")
         if not all(names):

@@ -74,7 +74,7 @@ def read_area(source: str, wanted: str | None = None) -> Area:
         ".gpkg", ".geojson", ".json",
     ):  # fmt: skip
         own = LON_LAT
-    boundary = read_boundary(source, None if target is None else int(target.partition(":")[2]))
+    boundary = read_boundary(source, target or "")
     polygon = boundary.polygon
     left, bottom, right, top = polygon.bounds
     if target is None and max(-left, right) <= 180.0 and max(-bottom, top) <= 90.0:
@@ -113,7 +113,7 @@ def _own_crs(source: str) -> str | None:
     path = Path(source)
     suffix = path.suffix.lower()
     if suffix == ".gpkg":
-        return next((None if srs is None else f"EPSG:{srs}" for _, srs, _ in read_geopackage(path)), None)
+        return next((srs for _, srs, _ in read_geopackage(path)), None)
     if suffix in (".geojson", ".json"):
         name, features = read_geojson(path)
         stated = stated_crs(crs_of_name(name))
@@ -157,7 +157,7 @@ def _metric(own: str, source: str) -> str:
     if not crs.is_geographic:
         return _refuse_degrees(own)
     # with a code of its own CRS, what is read stays in degrees
-    boundary = read_boundary(source, 4326)
+    boundary = read_boundary(source, "EPSG:4326")
     lon, lat = boundary.polygon.centroid.coords[0]
     return utm_on_datum("EPSG:4326" if own == LON_LAT else own, lon, lat)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.crs_text import same_system, system_in_words
 from aerotri.planning.area import Area
 
 MOST_NODES = 600
@@ -69,10 +70,9 @@ def ground_of_dem(path: Path, area: Area, reach: float) -> Ground:
 
     left, bottom, right, top = area.polygon.buffer(reach).bounds
     with MetricReader(path, target=area.crs) as reader:
-        if area.crs is not None and reader.epsg is not None and f"EPSG:{reader.epsg}" != area.crs:
-            raise InputError(
-                f"is in EPSG:{reader.epsg}, the plan in {area.crs}", f"give --crs EPSG:{reader.epsg}", path
-            )
+        if area.crs is not None and reader.plan and not same_system(reader.plan, area.crs):
+            own = system_in_words(reader.plan)
+            raise InputError(f"is in {own}, the plan in {area.crs}", f"give --crs {own}", path)
         step = max(reader.grid.cell_x, max(right - left, top - bottom) / MOST_NODES)
         x, y = np.arange(left, right + step, step), np.arange(bottom, top + step, step)
         shape = len(y), len(x)
@@ -92,7 +92,7 @@ def crs_of_dem(path: Path) -> str | None:
     from aerotri.rasters.metric import MetricReader
 
     with MetricReader(path) as reader:
-        return None if reader.epsg is None else f"EPSG:{reader.epsg}"
+        return reader.plan or None
 
 
 def _filled(z: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, in_digits
+from aerotri.crs_text import plan_of
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.change_areas import notes_of_areas, refuse_unknown_areas, with_whole_areas
 from aerotri.public.change_doubts import doubts_of_stable_ground
@@ -25,7 +26,6 @@ from aerotri.public.change_epochs import (
     grid_of,
     names_of,
     pair_of,
-    plan_code,
 )
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.places import place_in_words
@@ -227,14 +227,13 @@ def change(
     with ExitStack() as stack:
         epochs, brought = brought_to_metres(epochs_of((first, second), (first_adjustment, second_adjustment)))
         crs, of_heights = common_system(epochs)
-        epsg = plan_code(crs)
         grid = grid_of(epochs)
         same = epochs[0].key != "" and epochs[0].key == epochs[1].key
         (before, of_before), (after, of_after) = (epoch_of(one, grid, stack, noise_length, same) for one in epochs)
         notes = [*brought, *([of_heights] if of_heights else [])]
         notes += [text for text in (of_before, of_after) if text and stable is None]
-        ground = None if stable is None else _boundary_of(stable, epsg)
-        areas = _areas(area, grid, epsg)
+        ground = None if stable is None else _boundary_of(stable, crs)
+        areas = _areas(area, grid, crs)
         held = None if ground is None else ground.coverage(grid) > STABLE_PART
         _refuse_apart(ground, held, grid)
         if ground is None:
@@ -243,7 +242,7 @@ def change(
             align = "none"
             if not same:
                 notes.append("without stable ground the surfaces are compared as they lie")
-        pair = pair_of(epochs, grid, (before.z, after.z), epsg)
+        pair = pair_of(epochs, grid, (before.z, after.z), crs)
         if pair is not None:
             notes += [*doubts_of(epochs), pair.in_words()]
         elif same:
@@ -297,16 +296,16 @@ def _refuse_apart(ground: Boundary | None, held: np.ndarray | None, grid: Grid) 
         )
 
 
-def _boundary_of(stated: BaseGeometry | FilePath, epsg: int | None) -> Boundary:
+def _boundary_of(stated: BaseGeometry | FilePath, crs: str) -> Boundary:
     from aerotri.volume.boundary import boundary_of_parts, read_boundary
 
     if isinstance(stated, str | os.PathLike):
-        return read_boundary(os.fspath(stated), epsg)
+        return read_boundary(os.fspath(stated), plan_of(crs))
     return boundary_of_parts(stated, "the polygon given")
 
 
 def _areas(
-    stated: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | None, grid: Grid, epsg: int | None
+    stated: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | None, grid: Grid, crs: str
 ) -> dict[str, Boundary]:
     """The polygons of volumes by their names; more than one and all together."""
     import shapely
@@ -320,7 +319,7 @@ def _areas(
             raise InputError("no polygon is given", "give a polygon for every name")
         whole = boundary_of_piles([(str(name), polygon) for name, polygon in stated.items()], "the polygons given")
     else:
-        whole = _boundary_of(stated, epsg)
+        whole = _boundary_of(stated, crs)
     each = {name: boundary_of(polygon, name) for name, polygon in whole.piles}
     return {**each, "all together": whole} if each else {whole.name: whole}
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted, real_path
+from aerotri.crs_text import height_system, heights_of, plan_of, refuse_other_system, same_system, system_in_words
 from aerotri.public.models import check_crs
 from aerotri.public.places import place_in_words
 from aerotri.public.run_steps import DSM, DTM, RESULT
@@ -95,9 +96,7 @@ def _stated(given: SurfaceLike, adjustment: Adjustment | FilePath | None) -> Mea
     return MeasuredSurface(given, None if adjustment is None else StatedAdjustment(adjustment))
 
 
-def pair_of(
-    epochs: Epochs, grid: Grid, heights: tuple[np.ndarray, np.ndarray], epsg: int | None
-) -> AdjustedPair | None:
+def pair_of(epochs: Epochs, grid: Grid, heights: tuple[np.ndarray, np.ndarray], crs: str) -> AdjustedPair | None:
     """Both surfaces with their adjustments; None where these are not known.
 
     Parameters
@@ -114,7 +113,7 @@ def pair_of(
     if first is None or second is None:
         return None
     for one, stated in zip(epochs, (first, second), strict=True):
-        check_crs(stated.record, epsg, one.surface.path or Path(one.surface.label))
+        check_crs(stated.record, plan_of(crs), one.surface.path or Path(one.surface.label))
     if not (np.isfinite(heights[0]) & np.isfinite(heights[1])).any():
         message = "the surfaces {} and {} have no cell in common".format(*names_of(epochs))
         raise InputError(message, "check the CRS of both")
@@ -143,11 +142,6 @@ def names_of(epochs: Epochs) -> tuple[str, str]:
     return labels[0], labels[1]
 
 
-def plan_code(crs: str) -> int | None:
-    """EPSG code of the plan of 'EPSG:n' or 'EPSG:n+m'; None of ''."""
-    return int(crs.partition("+")[0].removeprefix("EPSG:")) if crs else None
-
-
 def common_system(epochs: Epochs) -> tuple[str, str]:
     """The system that both are in, and what the user should know of it.
 
@@ -162,12 +156,12 @@ def common_system(epochs: Epochs) -> tuple[str, str]:
     """
     from aerotri.rasters.metric import refuse_stretched
 
-    codes: list[str] = []
+    systems: list[str] = []
     for one in epochs:
         with one.surface.reader() as reader:
             refuse_stretched(reader)
-            codes.append(reader.crs_code)
-    return system_of_both(codes, names_of(epochs))
+            systems.append(reader.system)
+    return system_of_both(systems, names_of(epochs))
 
 
 def brought_to_metres(epochs: Epochs) -> tuple[Epochs, list[str]]:
@@ -192,38 +186,37 @@ def brought_to_metres(epochs: Epochs) -> tuple[Epochs, list[str]]:
     return (found[0], found[1]), list(dict.fromkeys(said))
 
 
-def system_of_both(codes: Sequence[str], labels: Sequence[str]) -> tuple[str, str]:
-    """As `common_system`, of the codes 'EPSG:n', 'EPSG:n+m' or '' of two epochs with their names.
+def system_of_both(systems: Sequence[str], labels: Sequence[str]) -> tuple[str, str]:
+    """As `common_system`, of the systems of two epochs (see `crs_text`) with their names.
 
     Raises
     ------
     InputError
         For two systems.
     """
-    plan, heights = zip(*((code.partition("+")[0], code.partition("+")[2]) for code in codes), strict=True)
-    if all(plan) and plan[0] != plan[1]:
-        raise InputError(f"{labels[1]} is in {plan[1]}, {labels[0]} in {plan[0]}", "bring them into one CRS")
-    if all(heights) and heights[0] != heights[1]:
+    plan, heights = zip(*((plan_of(text), heights_of(text)) for text in systems), strict=True)
+    refuse_other_system(plan[1], plan[0], labels[0], labels[1])
+    if all(heights) and not same_system(height_system(heights[0]), height_system(heights[1])):
         from aerotri.rasters.height_systems import height_system_in_words
 
         own, other = (height_system_in_words(code) for code in heights)
         message = f"heights of {labels[1]} are in {other}, of {labels[0]} in {own}"
         raise InputError(message, "bring them into one system of heights")
-    system = max(codes, key=lambda code: (bool(code), "+" in code))
-    return system, silent_in_words(codes, labels)
+    system = max(systems, key=lambda text: (bool(text), bool(heights_of(text))))
+    return system, silent_in_words(systems, labels)
 
 
-def silent_in_words(codes: Sequence[str], labels: Sequence[str]) -> str:
+def silent_in_words(systems: Sequence[str], labels: Sequence[str]) -> str:
     """Which of two surfaces does not state a system that the other one states; '' where both are alike in that.
 
     Parameters
     ----------
-    codes : 'EPSG:n', 'EPSG:n+m' or ''. labels : their names.
+    systems : see `crs_text`. labels : their names.
     """
-    for own, other, label in zip(codes, reversed(codes), labels, strict=True):
+    for own, other, label in zip(systems, reversed(systems), labels, strict=True):
         if other and not own:
-            return f"{label} does not say its coordinate system; taken for {other}"
-        if "+" in other and "+" not in own:
+            return f"{label} does not say its coordinate system; taken for {system_in_words(other)}"
+        if heights_of(other) and not heights_of(own):
             return f"{label} does not say in which system its heights are"
     return ""
 

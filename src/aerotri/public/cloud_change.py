@@ -11,7 +11,7 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.argument_types import with_checked_types
-from aerotri.public.change_epochs import plan_code, system_of_both
+from aerotri.public.change_epochs import system_of_both
 from aerotri.public.cloud_epochs import (
     by_adjustments,
     check_sizes,
@@ -243,9 +243,9 @@ def cloud_change(
     if not np.isfinite(found.distance).any():
         raise InputError("the two clouds do not meet", "check the CRS of both, or give a larger --cylinder and --reach")
     stated = (first_adjustment, second_adjustment)
-    found, adjusted, said, is_known = by_adjustments(found, epochs, (before, after), stated, plan_code(crs))
+    found, adjusted, said, is_known = by_adjustments(found, epochs, (before, after), stated, crs)
     notes = [text for text in (of_heights, unlike, *said) if text]
-    held = None if stable is None else within(stable, plan_code(crs), core)
+    held = None if stable is None else within(stable, crs, core)
     on_stable = None if held is None else registration_of(found, held)
     if on_stable is not None and not np.isfinite(on_stable[1]):
         raise InputError("no place with a distance lies on the stable ground", "give other ground, or check its CRS")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, real_path
+from aerotri.crs_text import plan_of
 from aerotri.public.dense import RECORD as DENSE
 from aerotri.public.models import check_crs
 from aerotri.public.stated import StatedAdjustment
@@ -117,7 +118,7 @@ def known_alike(first: Cloud, second: Cloud) -> tuple[Cloud, Cloud, str]:
 
 def by_adjustments(
     found: CloudDistances, epochs: tuple[CloudEpoch, CloudEpoch], clouds: tuple[Cloud, Cloud],
-    adjustments: tuple[Adjustment | FilePath | None, ...], epsg: int | None,
+    adjustments: tuple[Adjustment | FilePath | None, ...], crs: str,
 ) -> tuple[CloudDistances, AdjustedDistances | None, list[str], bool]:  # fmt: skip
     """The distances with a σ that knows the adjustments as far as they are known, sentences about them, and whether how
     the clouds lie to one another is known of them.
@@ -142,7 +143,7 @@ def by_adjustments(
             "give both: --first-adjustment and --second-adjustment; one result for both where they share it",
         )
     for epoch, stated in zip(epochs, (first, second), strict=True):
-        check_crs(stated.record, epsg, Path(epoch.label))
+        check_crs(stated.record, plan_of(crs), Path(epoch.label))
     records = (first.record, first.record if second.is_same(first) else second.record)
     adjusted = adjusted_distances(found, clouds, records)
     said = list(dict.fromkeys(text for one in (first, second) for text in (one.doubt, one.missing) if text))
@@ -190,11 +191,13 @@ def check_sizes(sizes: Sequence[tuple[str, float]]) -> None:
             raise InputError(f"{name} {value:g} m is not possible", "give metres above 0")
 
 
-def within(stable: BaseGeometry | FilePath, epsg: int | None, core: np.ndarray) -> np.ndarray:
+def within(stable: BaseGeometry | FilePath, crs: str, core: np.ndarray) -> np.ndarray:
     """(k,) bool, which places (k, 3) lie on stable ground."""
     import shapely
 
     from aerotri.volume.boundary import read_boundary
 
-    polygon = read_boundary(os.fspath(stable), epsg).polygon if isinstance(stable, str | os.PathLike) else stable
+    polygon = (
+        read_boundary(os.fspath(stable), plan_of(crs)).polygon if isinstance(stable, str | os.PathLike) else stable
+    )
     return shapely.contains_xy(polygon, core[:, 0], core[:, 1])

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, real_path
+from aerotri.crs_text import refuse_other_system
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.files.spool import Spool
 from aerotri.public.adjustment import Adjustment
@@ -192,7 +193,7 @@ def correct_dem(
             refuse_without_errors(photographs, stated.name)
         stack.enter_context(cache_limited())
         reader = _reader(dem, stack)
-        check_crs(record, reader.epsg, reader.path)
+        check_crs(record, reader.plan, reader.path)
         numbers = OneModel(*pair) if pair is not None else _model_map(models, model_table, reader, stack)
         crs_note = numbers.note if isinstance(numbers, PolygonMap) else ""
         models_of_dem = dem_models(record, photographs, numbers.names)
@@ -251,11 +252,9 @@ def _model_map(
     else:
         path = Path(models)
         if path.suffix.lower() in VECTOR_ENDINGS:
-            return read_polygons(path, reader.epsg)
+            return read_polygons(path, reader.plan)
         numbers, names = stack.enter_context(RasterReader(path)), None
-    if numbers.epsg is not None and reader.epsg is not None and numbers.epsg != reader.epsg:
-        message = f"is in EPSG:{numbers.epsg}, the DEM in EPSG:{reader.epsg}"
-        raise InputError(message, "bring it into one CRS", numbers.path)
+    refuse_other_system(numbers.plan, reader.plan, "the DEM", numbers.path)
     if names is None:
         names = read_number_table(Path(table) if table is not None else table_beside(numbers.path))
     return number_map(numbers, names)

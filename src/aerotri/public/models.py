@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.crs_text import same_system, system_in_words
 from aerotri.deformation.block_models import BlockDeformation
 from aerotri.deformation.model_grid import Deformation
 from aerotri.public.adjustment import Adjustment
@@ -268,11 +269,11 @@ def _ground(record: Record, dem: FilePath | None, stack: ExitStack) -> tuple[Gro
     if own is None and reader.note:
         # where a local block lies in that CRS nobody knows
         refuse_other_units(stack.enter_context(RasterReader(place)))
-    check_crs(record, reader.epsg, place)
+    check_crs(record, reader.plan, place)
     return DemGround(reader), (reader.note,) if reader.note else ()
 
 
-def check_crs(record: Record, epsg: int | None, dem: Path) -> None:
+def check_crs(record: Record, plan: str, dem: Path) -> None:
     """Refuse a DEM in another CRS than the block's; one without a CRS is taken for one in the block's.
 
     Raises
@@ -282,8 +283,9 @@ def check_crs(record: Record, epsg: int | None, dem: Path) -> None:
     from aerotri.rasters.grids import horizontal_crs
 
     own = horizontal_crs(record.result.block.crs)
-    if own is not None and epsg is not None and own.upper() != f"EPSG:{epsg}":
-        raise InputError(f"is in EPSG:{epsg}, the block in {own}", "bring the DEM into the CRS of the block", dem)
+    if own is not None and plan and not same_system(own, plan):
+        message = f"is in {system_in_words(plan)}, the block in {own}"
+        raise InputError(message, "bring the DEM into the CRS of the block", dem)
 
 
 def _write(target: Path, found: ModelDeformation, plots: bool) -> None:

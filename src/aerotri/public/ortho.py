@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted
+from aerotri.crs_text import same_system, system_in_words
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.execution.opening import opened
 from aerotri.public.adjustment import Adjustment
@@ -349,12 +350,12 @@ def _opened(given: MeasuredSurface, record: Record, stack: ExitStack) -> tuple[A
         refuse_other_units(found)
         known = found.bands > 1
         sigma = stack.enter_context(RasterReader(surface.path, band=2)) if known else None
-    own = None if found.epsg is None else f"EPSG:{found.epsg}"
-    if own is not None and own != crs:
+    own = found.plan
+    if own and (crs is None or not same_system(own, crs)):
         remedy = "give a surface of the same system" if crs is None else f"bring it there: gdalwarp -t_srs {crs} IN OUT"
-        raise InputError(f"is in {own}, the block in {crs or 'local coordinates'}", remedy, found.path)
+        raise InputError(f"is in {system_in_words(own)}, the block in {crs or 'local coordinates'}", remedy, found.path)
     notes = []
-    if own is None and crs is not None:
+    if not own and crs is not None:
         notes.append(f"{surface.label} does not say its coordinate system; taken for {crs}")
     if not known:
         notes.append(f"{surface.label} has no σ: the accuracy of the orthophoto is stated without that of the heights")

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.crs_text import height_system, heights_of, refuse_other_system, same_system
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.change_epochs import silent_in_words
 from aerotri.public.folders import refuse_foreign_folder
@@ -242,22 +243,19 @@ def compare(
         report.stage("reading", None)
         stack.enter_context(cache_limited())
         one, other = _sources(test, control, stack)
-        if one.epsg is not None and other.epsg is not None and one.epsg != other.epsg:
-            message = f"is in EPSG:{one.epsg}, the control in EPSG:{other.epsg}"
-            raise InputError(message, "bring them into one CRS", _file(test) or _name(test))
+        refuse_other_system(one.plan, other.plan, "the control", _file(test) or _name(test))
         same = same_cells(one.heights, other.heights, (one.area, other.area), cell)
         grid = same or common_grid(one.area, other.area, cell or max(one.cell, other.cell))
         report.stage("comparing", None)
         found = differences(
             one.heights, other.heights, grid, method, align, lambda k, n: report.counted("comparing", k, n)
         )
-    epsg = one.epsg or other.epsg
     notes = tuple(source.note for source in (one, other) if source.note) + _systems_in_words(
         (one, other), (test, control)
     )
     if same is not None and align == "none":
         notes += (_of_cells(same, one, method),)
-    crs = None if epsg is None else f"EPSG:{epsg}"
+    crs = one.plan or other.plan or None
     head = Head(project_of(project, test, control), max(one.crs, other.crs, key=len))
     used = used_arguments(compare, {"method": method, "align": align, "cell": cell}, {"cell": "m"})
     lasting = tuple(map(_lasting_of, (test, control)))
@@ -285,8 +283,8 @@ def _systems_in_words(both: Sequence[HeightSource], given: Sequence[SurfaceLike]
     points = [file is not None and file.suffix == ".parquet" for file in map(_file, given)]
     silent = "" if any(points) else silent_in_words([one.crs for one in both], [_name(one) for one in given])
     said = [silent] if silent else []
-    own, other = (one.crs.partition("+")[2] for one in both)
-    if own and other and own != other:
+    own, other = (heights_of(one.crs) for one in both)
+    if own and other and not same_system(height_system(own), height_system(other)):
         from aerotri.rasters.height_systems import height_system_in_words
 
         said.append(

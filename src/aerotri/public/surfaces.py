@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.crs_text import heights_of, with_heights
 from aerotri.public.folders import refuse_existing_file
 from aerotri.public.optional import optional_module
 from aerotri.rasters.grids import Grid
@@ -220,10 +221,10 @@ class Surface:
         from aerotri.rasters.height_systems import metric_height_system
 
         if isinstance(self.source, Heights):
-            plan, _, heights = (self.crs or "").partition("+")
-            return f"{plan}+{metric_height_system(heights)}" if heights.isdigit() else self.crs
+            heights = heights_of(self.crs or "")
+            return with_heights(self.crs or "", metric_height_system(heights)) if heights else self.crs
         with self.reader() as reader:
-            return reader.crs_code or None
+            return reader.system or None
 
     def __repr__(self) -> str:
         return f"<aerotri.Surface {self.label!r}, {'in memory' if self.path is None else self.path}>"

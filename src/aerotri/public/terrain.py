@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted
+from aerotri.crs_text import plan_of
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.argument_types import with_checked_types
@@ -390,7 +391,6 @@ def outline_of(stated: BaseGeometry | FilePath, crs: str) -> Boundary:
     ------
     InputError
     """
-    from pyproj import CRS
     from shapely.geometry.base import BaseGeometry
 
     from aerotri.rasters.grids import horizontal_crs
@@ -399,7 +399,7 @@ def outline_of(stated: BaseGeometry | FilePath, crs: str) -> Boundary:
     if isinstance(stated, BaseGeometry):
         return boundary_of(stated, "the polygon given")
     plane = horizontal_crs(crs)
-    return read_boundary(os.fspath(stated), CRS.from_user_input(plane).to_epsg() if plane else None)
+    return read_boundary(os.fspath(stated), plan_of(plane or ""))
 
 
 def _write(target: Path, model: TerrainModel, plots: bool) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.crs_text import height_system, heights_of, refuse_other_system, same_system, system_in_words
 from aerotri.formats.files.spool import Spool
 from aerotri.observations.project import Project
 from aerotri.public.argument_types import with_checked_types
@@ -255,7 +256,7 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
         else:
             sigma = finder.of_one(base, boundary, volumes.chosen)
         notes = finder.doubts
-    crs = reader.crs_code
+    crs = reader.system
     measured_with = (top.adjustment.name, top.name_of_points) if top.adjustment else ("", "")
     sources = Sources(reader.path.name, crs, *measured_with)
     head = Head(asked.project, crs)
@@ -268,7 +269,7 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     content["base"]["follows_surface"] = _follows(asked.base)
     content["settings"] = asked.settings
     outlines = outline_notes(boundary, min(reader.grid.cell_x, reader.grid.cell_y)) if _follows(asked.base) else ()
-    silent = "" if any(other.crs_code for other in others) else _without_crs(top, reader)
+    silent = "" if any(other.system for other in others) else _without_crs(top, reader)
     crs_notes = (reader.note, silent, *(other.note for other in others), *systems, boundary.note, *outlines)
     content["warnings"] = [*(text for text in crs_notes if text), *content["warnings"]]
     profiles = chosen_profiles(reader, base, boundary, volumes.sections)
@@ -291,7 +292,7 @@ def _stated_alone(
 
 def _without_crs(top: MeasuredSurface, reader: Reader) -> str:
     """What is taken for granted of a file that says no CRS, where no adjustment says that the block is local; or ''."""
-    if top.surface.path is None or top.adjustment is not None or reader.crs_code:
+    if top.surface.path is None or top.adjustment is not None or reader.system:
         return ""
     return f"{reader.path.name} does not say its coordinate system; X, Y and heights are taken for metres"
 
@@ -315,7 +316,7 @@ def _refuse_apart(boundary: Boundary, reader: Reader) -> None:
     edges = reader.grid.bounds
     for name, polygon in boundary.piles or ((boundary.name, boundary.polygon),):
         if not shapely.intersects(polygon, shapely.box(*edges)):
-            where = f" ({reader.crs_code})" if reader.crs_code else ""
+            where = f" ({system_in_words(reader.system)})" if reader.system else ""
             note = f"; {boundary.note}" if boundary.note else ""
             raise InputError(
                 f"'{name}' does not meet the surface: it lies at {place_in_words(polygon.bounds)}, the "
@@ -355,7 +356,7 @@ def _boundary(stated: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | Non
         if not stated:
             raise InputError("no polygon is given", "give a polygon for every name")
         return boundary_of_piles([(str(name), polygon) for name, polygon in stated.items()], "the polygons given")
-    return read_boundary(os.fspath(stated), reader.epsg)
+    return read_boundary(os.fspath(stated), reader.plan)
 
 
 def _base(
@@ -381,12 +382,10 @@ def _base(
             if not _follows(stated):
                 raise
             raise InputError(error.message, error.remedy, reader.path) from error
-    other = stack.enter_context(below.surface.reader(None if reader.epsg is None else f"EPSG:{reader.epsg}"))
-    if other.epsg is not None and reader.epsg is not None and other.epsg != reader.epsg:
-        message = f"is in EPSG:{other.epsg}, the surface in EPSG:{reader.epsg}"
-        raise InputError(message, "bring it into one CRS", other.path)
-    heights, own = (one.crs_code.partition("+")[2] for one in (other, reader))
-    if heights and own and heights != own:
+    other = stack.enter_context(below.surface.reader(reader.plan or None))
+    refuse_other_system(other.plan, reader.plan, "the surface", other.path)
+    heights, own = (heights_of(one.system) for one in (other, reader))
+    if heights and own and not same_system(height_system(heights), height_system(own)):
         message = (f"its heights are in {height_system_in_words(heights)}, those of {reader.path.name} in "
                    f"{height_system_in_words(own)}")  # fmt: skip
         raise InputError(message, "bring them into one system of heights", other.path)
@@ -399,12 +398,12 @@ def _systems_in_words(reader: Reader, other: Reader) -> list[str]:
     """What is taken for granted where one of surface and base does not say its systems."""
     said = []
     for one, second in ((reader, other), (other, reader)):
-        if one.epsg is None and second.epsg is not None:
-            said.append(f"{one.path.name} has no CRS that is known; it is taken for EPSG:{second.epsg}, as "
+        if second.plan and not one.plan:
+            said.append(f"{one.path.name} states no CRS; it is taken for {system_in_words(second.plan)}, as "
                         f"{second.path.name} is")  # fmt: skip
-        if "+" in second.crs_code and "+" not in one.crs_code:
+        if heights_of(second.system) and not heights_of(one.system):
             said.append(f"{one.path.name} does not say in which system its heights are; they are taken for those of "
-                        f"{second.path.name}, {second.crs_code}")  # fmt: skip
+                        f"{second.path.name}, {system_in_words(second.system)}")  # fmt: skip
     return said
 
 
@@ -424,7 +423,7 @@ def _volumes(
     part = reader.grid.window(row, column, rows, columns)
     means = ThicknessMeans(part)
     # heights that the file has in feet are in metres here
-    crs = reader.crs_code if "+" in reader.crs_code else reader.crs
+    crs = reader.system if heights_of(reader.system) else reader.crs
     with RasterWriter(spool.folder / THICKNESS, part, crs=crs, options={"compress": "deflate"}) as writer:
         writer.describe("surface − base, m")
 

@@ -144,7 +144,7 @@ class SigmaOfVolumes:
         stated = self.top.adjustment
         if stated is None:
             raise InputError("the surface has no adjustment", "state the one it was measured with")
-        check_crs(stated.record, self.reader.epsg, self.reader.path)
+        check_crs(stated.record, self.reader.plan, self.reader.path)
         return stated.record
 
     @cached_property

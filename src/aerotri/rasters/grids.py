@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerotri.conventions import FilePath, InputError, regular_file
+from aerotri.crs_text import crs_text, plan_of
 from aerotri.rasters.quiet import quietly
 from aerotri.vectors.geojson import LARGEST_M
 
@@ -190,36 +191,24 @@ class RasterReader:
             raise InputError("has a scale or an offset", "write the values out (gdal_translate -unscale)", self.path)
 
     @property
-    def epsg(self) -> int | None:
-        """Code of the CRS, of its plan where it has a height system too; None where it has none."""
+    def system(self) -> str:
+        """The CRS with that of its heights, as of `crs_text`; '' where the file states none."""
         if self.crs is None:
-            return None
-        with _told(self.path, "has a CRS that cannot be read", "write the file anew"):
-            text = self.crs.to_wkt()
-            # some pairs of plan and heights have a code of their own, EPSG:5555: that of the plan is asked for
-            if not text.startswith(COMPOUND):
-                return self.crs.to_epsg()
+            return ""
         from pyproj import CRS
         from pyproj.exceptions import CRSError
 
+        with _told(self.path, "has a CRS that cannot be read", "write the file anew"):
+            text = self.crs.to_wkt()
         try:
-            whole = CRS.from_wkt(text)
+            return crs_text(CRS.from_wkt(text))
         except CRSError:
-            return None
-        return whole.sub_crs_list[0].to_epsg() if whole.is_compound else None
+            return text
 
     @property
-    def crs_code(self) -> str:
-        """'EPSG:n', 'EPSG:n+m' where a height system with a code is stated, '' without a code."""
-        code, heights = self.epsg, None
-        if code is None:
-            return ""
-        from pyproj import CRS
-
-        whole = CRS.from_wkt(self.crs.to_wkt())
-        if whole.is_compound:
-            heights = whole.sub_crs_list[1].to_epsg()
-        return f"EPSG:{code}" if heights is None else f"EPSG:{code}+{heights}"
+    def plan(self) -> str:
+        """The CRS of X and Y, as of `crs_text`; '' where the file states none."""
+        return plan_of(self.system)
 
     @property
     def stated_unit(self) -> str:

@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 
+from aerotri.crs_text import heights_of, plan_of, with_heights
 from aerotri.rasters.grids import Grid, bilinear
 from aerotri.rasters.height_systems import metric_height_system
 
@@ -35,18 +36,16 @@ class HeldRaster:
         self.values, self.options = np.where(np.isinf(heights), np.float32(np.nan), heights), {}
 
     @property
-    def epsg(self) -> int | None:
-        """Code of the CRS, of its plan where it has a height system too; None where it has none."""
-        authority, _, codes = (self.crs or "").partition(":")
-        code = codes.partition("+")[0]
-        return int(code) if authority.upper() == "EPSG" and code.isdigit() else None
+    def system(self) -> str:
+        """The CRS as of `crs_text`, that of the heights in metres as they are; '' where none is stated."""
+        stated = self.crs or ""
+        heights = heights_of(stated)
+        return with_heights(stated, metric_height_system(heights)) if heights else stated
 
     @property
-    def crs_code(self) -> str:
-        """'EPSG:n', 'EPSG:n+m' where a height system is stated, m in metres as the heights are; '' without a code."""
-        heights = (self.crs or "").partition("+")[2]
-        up = f"+{metric_height_system(heights)}" if heights.isdigit() else ""
-        return "" if self.epsg is None else f"EPSG:{self.epsg}{up}"
+    def plan(self) -> str:
+        """The CRS of X and Y, as of `crs_text`; '' where none is stated."""
+        return plan_of(self.system)
 
     def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
         """A window, (rows, columns) float32; NaN where nothing is known and beyond the edges."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.crs_text import heights_of, with_heights
 from aerotri.rasters.grids import NO_DATA, Grid, RasterReader
 from aerotri.rasters.height_systems import metric_height_system
 
@@ -107,11 +108,11 @@ class MetricReader(RasterReader):
         return self._source is not None
 
     @property
-    def crs_code(self) -> str:
+    def system(self) -> str:
         """As of `RasterReader`; heights stay on their datum where they, or the plan, were brought to metres."""
-        plan, _, heights = super().crs_code.partition("+")
-        heights = heights or self._heights
-        return f"{plan}+{metric_height_system(heights)}" if plan and heights else plan
+        stated = super().system
+        heights = heights_of(stated) or self._heights
+        return with_heights(stated, metric_height_system(heights)) if stated and heights else stated
 
     def _bring_to_metres(self, target: str | None) -> None:
         units = units_of(self)
@@ -147,7 +148,7 @@ class MetricReader(RasterReader):
             warped = WarpedVRT(self._file, crs=target, resampling=Resampling.bilinear, nodata=no_data, dtype="float64")
         except RasterioError as error:
             raise InputError(f"cannot be brought to {target}: {error}", "check its CRS", self.path) from error
-        self._heights = super().crs_code.partition("+")[2]
+        self._heights = heights_of(super().system)
         self._source, self._file = self._file, warped
         t = warped.transform
         self.grid = Grid(warped.height, warped.width, t.c, t.f, t.a, -t.e)
@@ -268,7 +269,7 @@ def metric_target(readers: Sequence[MetricReader | HeldRaster]) -> str | None:
 
     Where no file has been in metres, the system that the first of them was brought to.
     """
-    plans = [(reader, reader.crs_code.partition("+")[0]) for reader in readers]
+    plans = [(reader, reader.plan) for reader in readers]
     own = [plan for reader, plan in plans if plan and not (isinstance(reader, MetricReader) and reader.is_brought)]
     return next(iter(own or [plan for _, plan in plans if plan]), None)
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.crs_text import same_system, system_in_words
 
 LON_LAT = "OGC:CRS84"
 """Longitude and latitude on WGS 84: what GeoJSON has by RFC 7946."""
@@ -45,29 +46,31 @@ class VectorSystem:
         return found
 
 
-def vector_system(own: str | None, epsg: int | None, name: str) -> VectorSystem:
+def vector_system(own: str | None, crs: str, name: str) -> VectorSystem:
     """From the CRS that a file names to that of the surface.
 
     Parameters
     ----------
-    own : as 'EPSG:25832', None where the file does not say. epsg : of the surface, None where it has none.
+    own : as 'EPSG:25832', None where the file does not say. crs : of the surface, see `crs_text`, '' where it has none.
     name : of the file, for the note.
     """
-    if own is None or (epsg is not None and own.upper() == f"EPSG:{epsg}"):
+    if own is None or (crs and same_system(own, crs)):
         return VectorSystem()
-    if epsg is None:
-        return VectorSystem(None, f"{name} is in {own}; the surface has no CRS, its coordinates are taken for these")
+    words = system_in_words(own)
+    if not crs:
+        return VectorSystem(None, f"{name} is in {words}; the surface has no CRS, its coordinates are taken for these")
     from pyproj import Transformer
     from pyproj.exceptions import ProjError
 
     try:
-        transformer = Transformer.from_crs(own, f"EPSG:{epsg}", always_xy=True)
+        transformer = Transformer.from_crs(own, crs, always_xy=True)
     except ProjError:
-        raise InputError(f"{name}: PROJ knows no way from {own} to EPSG:{epsg}", "bring it into one CRS") from None
-    return VectorSystem(transformer, f"{name} was brought from {own} to EPSG:{epsg}")
+        message = f"{name}: PROJ knows no way from {words} to {system_in_words(crs)}"
+        raise InputError(message, "bring it into one CRS") from None
+    return VectorSystem(transformer, f"{name} was brought from {words} to {system_in_words(crs)}")
 
 
-def system_of_geojson(content: Mapping[str, Any], xy: np.ndarray, epsg: int | None, name: str) -> VectorSystem:
+def system_of_geojson(content: Mapping[str, Any], xy: np.ndarray, crs: str, name: str) -> VectorSystem:
     """Of GeoJSON: the old member "crs" where it has one, else longitude and latitude.
 
     Coordinates that can be no longitudes and latitudes, in a file that names no CRS, are those of the surface.
@@ -78,18 +81,19 @@ def system_of_geojson(content: Mapping[str, Any], xy: np.ndarray, epsg: int | No
     """
     own = stated_crs(content)
     if own is not None:
-        return vector_system(own, epsg, name)
-    if epsg is None:
+        return vector_system(own, crs, name)
+    if not crs:
         return VectorSystem()
+    words = system_in_words(crs)
     if "crs" not in content and len(xy) and np.all(np.abs(xy) <= [180.0, 90.0]):
-        found = vector_system(LON_LAT, epsg, name)
-        note = f"{name} was brought from longitude and latitude, which GeoJSON has by RFC 7946, to EPSG:{epsg}"
+        found = vector_system(LON_LAT, crs, name)
+        note = f"{name} was brought from longitude and latitude, which GeoJSON has by RFC 7946, to {words}"
         return VectorSystem(found.transformer, note)
     named = _named_crs(content)
     if named:
-        return VectorSystem(None, f"{name} names the CRS '{named}', which is not known: taken for EPSG:{epsg}")
+        return VectorSystem(None, f"{name} names the CRS '{named}', which is not known: taken for {words}")
     return VectorSystem(
-        None, f"{name} names no CRS, and its coordinates are no longitudes and latitudes: taken for EPSG:{epsg}"
+        None, f"{name} names no CRS, and its coordinates are no longitudes and latitudes: taken for {words}"
     )
 
 

@@ -15,7 +15,7 @@ LARGEST_M = 1e12
 """No coordinate lies farther out; numbers beyond lose their decimals, and squares of them overflow."""
 DEPTH = {"Point": 0, "MultiPoint": 1, "LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 3}
 """Lists around a position, by the kind of geometry."""
-REMEDY = "give a FeatureCollection as GeoJSON has it"
+REMEDY = "give a FeatureCollection, a Feature or a geometry as GeoJSON (RFC 7946) has them"
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,12 @@ def read_geojson(path: Path) -> tuple[str, list[GeoJsonFeature]]:
     Raises
     ------
     InputError
-        When the file cannot be read, is no JSON or no FeatureCollection, naming the feature that is wrong.
+        When the file cannot be read, is no JSON or no GeoJSON, naming the feature that is wrong.
     """
     content = _content(path)
-    if not isinstance(content, dict) or not isinstance(content.get("features"), list):
-        raise InputError("is no FeatureCollection", REMEDY, path)
-    features = [_feature(entry, number, path) for number, entry in enumerate(content["features"], start=1)]
+    if not isinstance(content, dict):
+        raise InputError("is no GeoJSON", REMEDY, path)
+    features = [_feature(entry, number, path) for number, entry in enumerate(_entries(content, path), start=1)]
     return _crs_name(content, path), features
 
 
@@ -63,6 +63,18 @@ def _content(path: Path) -> Any:
         raise InputError(f"is not JSON: {error.msg}", "is it cut off?", path, error.lineno) from error
     except (RecursionError, ValueError) as error:
         raise InputError("is not JSON that can be read: it is nested too deeply", REMEDY, path) from error
+
+
+def _entries(content: dict[str, Any], path: Path) -> list[Any]:
+    """The features of a collection, of a single feature, or of a geometry alone [L: RFC 7946, 3]."""
+    kind = content.get("type")
+    if isinstance(content.get("features"), list):
+        return content["features"]
+    if kind == "Feature":
+        return [content]
+    if kind == "GeometryCollection" or kind in DEPTH:
+        return [{"type": "Feature", "properties": None, "geometry": content}]
+    raise InputError("is no GeoJSON", REMEDY, path)
 
 
 def _crs_name(content: dict[str, Any], path: Path) -> str:

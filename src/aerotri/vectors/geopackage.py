@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import InputError, real_path
+from aerotri.crs_text import is_known_system
 from aerotri.vectors.geojson import LARGEST_M
 
 ENVELOPE_BYTES = (0, 32, 48, 48, 64)
@@ -44,8 +45,8 @@ class GeoPackageFeature:
     parts: list[list[np.ndarray]]
 
 
-def read_geopackage(path: Path) -> Iterator[tuple[str, int | None, Iterator[GeoPackageFeature]]]:
-    """Name, code of the CRS (None where not known) and rows of every layer with geometries.
+def read_geopackage(path: Path) -> Iterator[tuple[str, str | None, Iterator[GeoPackageFeature]]]:
+    """Name, CRS as PROJ reads it (None where not known) and rows of every layer with geometries.
 
     Raises
     ------
@@ -74,14 +75,27 @@ def _limit(database: sqlite3.Connection) -> None:
     database.execute("PRAGMA trusted_schema = OFF")
 
 
-def _layers(database: sqlite3.Connection, path: Path) -> list[tuple[str, str, int | None]]:
+def _layers(database: sqlite3.Connection, path: Path) -> list[tuple[str, str, str | None]]:
     found = []
     query = "SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns"
     for table, column, srs in database.execute(query).fetchall():
         if not isinstance(table, str) or not isinstance(column, str) or not isinstance(srs, int):
             raise InputError("its list of layers is damaged", REMEDY, path)
-        found.append((table, column, srs if srs > 0 else None))
+        found.append((table, column, _system(database, srs, path) if srs > 0 else None))
     return found
+
+
+def _system(database: sqlite3.Connection, srs: int, path: Path) -> str:
+    """The CRS of a number of the file's own list: by organisation and code, else by its definition."""
+    query = "SELECT organization, organization_coordsys_id, definition FROM gpkg_spatial_ref_sys WHERE srs_id = ?"
+    row = database.execute(query, (srs,)).fetchone()
+    if row is None:
+        raise InputError(f"its list of coordinate systems has no number {srs}", REMEDY, path)
+    code, definition = f"{row[0]}:{row[1]}".upper(), str(row[2])
+    for text in (code, definition):
+        if is_known_system(text):
+            return text
+    raise InputError(f"its CRS {code} is not known, and has no definition that can be read", REMEDY, path)
 
 
 def _rows(database: sqlite3.Connection, table: str, column: str, path: Path) -> Iterator[GeoPackageFeature]:

@@ -25,12 +25,12 @@ FILE_REMEDY = "give a GeoPackage (.gpkg), GeoJSON (.geojson, .json), or a text f
 Feature = tuple[Mapping[str, Any], BaseGeometry]
 
 
-def polygon_features(path: Path, epsg: int | None = None) -> tuple[list[Feature], str]:
+def polygon_features(path: Path, crs: str = "") -> tuple[list[Feature], str]:
     """Attributes and polygons of GeoJSON or GeoPackage, in the order of the file, and a sentence about their CRS.
 
     Parameters
     ----------
-    epsg : code of the CRS they are wanted in; None when not known.
+    crs : that they are wanted in, see `crs_text`; '' where not known.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def polygon_features(path: Path, epsg: int | None = None) -> tuple[list[Feature]
     found: list[Feature] = []
     number = 0
     try:
-        features, system = read(path, epsg)
+        features, system = read(path, crs)
         for number, (properties, geometry) in enumerate(features, start=1):
             if geometry is None or geometry.is_empty:
                 raise InputError(f"feature {number} is no polygon", "give polygons only", path)
@@ -99,7 +99,7 @@ def _united_parts(collection: BaseGeometry, path: Path | None) -> BaseGeometry:
     return shapely.MultiPolygon([own for part in parts for own in shapely.get_parts(part)])
 
 
-def _geojson_features(path: Path, epsg: int | None) -> tuple[Sequence[tuple[Mapping[str, Any], Any]], VectorSystem]:
+def _geojson_features(path: Path, crs: str) -> tuple[Sequence[tuple[Mapping[str, Any], Any]], VectorSystem]:
     name, read = read_geojson(path)
     features = [
         (one.properties, shape({"type": one.kind, "coordinates": one.coordinates}) if one.kind in KINDS else None)
@@ -107,16 +107,16 @@ def _geojson_features(path: Path, epsg: int | None) -> tuple[Sequence[tuple[Mapp
     ]
     xy = [shapely.get_coordinates(geometry) for _, geometry in features if geometry is not None]
     places = np.concatenate(xy) if xy else np.zeros((0, 2))
-    return features, system_of_geojson(crs_of_name(name), places, epsg, path.name)
+    return features, system_of_geojson(crs_of_name(name), places, crs, path.name)
 
 
-def _gpkg_features(path: Path, epsg: int | None) -> tuple[Sequence[tuple[Mapping[str, Any], Any]], VectorSystem]:
+def _gpkg_features(path: Path, crs: str) -> tuple[Sequence[tuple[Mapping[str, Any], Any]], VectorSystem]:
     layers, features, system = 0, [], VectorSystem()
     for layers, (_, srs, rows) in enumerate(read_geopackage(path), start=1):
         if layers > 1:
             break
         features = [(row.properties, _polygon(row.parts) if row.kind in KINDS else None) for row in rows]
-        system = vector_system(None if srs is None else f"EPSG:{srs}", epsg, path.name)
+        system = vector_system(srs, crs, path.name)
     if layers != 1:
         raise InputError(f"has {layers or 'no'} layers", "give a GeoPackage with one layer of polygons", path)
     return features, system

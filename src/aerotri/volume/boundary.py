@@ -246,18 +246,19 @@ def _attribute_of_names(attributes: Sequence[Mapping[str, Any]]) -> str:
     return next((key for key in texts if len({own[key] for own in attributes}) == len(attributes)), "")
 
 
-def read_boundary(source: str, epsg: int | None = None) -> Boundary:
+def read_boundary(source: str, crs: str = "") -> Boundary:
     """The boundary of a file (GeoPackage, GeoJSON, WKT) or of a WKT text; several polygons are piles.
 
     Parameters
     ----------
-    epsg : CRS of the surface; what names another one is brought to it, and GeoJSON is longitude and latitude.
+    crs : of the surface, see `crs_text`, '' where not known; what names another one is brought to it, and GeoJSON is
+        longitude and latitude.
     """
     if source.lstrip().upper().startswith((*WKT_KINDS, "SRID=")):
-        return _of_wkt(source, "the polygon given", epsg)
+        return _of_wkt(source, "the polygon given", crs)
     path = Path(source)
     if path.suffix.lower() in VECTOR_ENDINGS:
-        features, note = polygon_features(path, epsg)
+        features, note = polygon_features(path, crs)
         polygons = [polygon for _, polygon in features]
         if not polygons:
             raise InputError("has no polygons", "give the boundary of the volume", path)
@@ -273,11 +274,11 @@ def read_boundary(source: str, epsg: int | None = None) -> Boundary:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read: {error}", FILE_REMEDY, path) from error
-    return _of_wkt(text, path.name, epsg, path)
+    return _of_wkt(text, path.name, crs, path)
 
 
-def _of_wkt(text: str, name: str, epsg: int | None, path: Path | None = None) -> Boundary:
-    system = vector_system(srid_of_wkt(text), epsg, name)
+def _of_wkt(text: str, name: str, crs: str, path: Path | None = None) -> Boundary:
+    system = vector_system(srid_of_wkt(text), crs, name)
     return boundary_of_parts(placed(polygon_of_wkt(text, path), system, path), name, system.note, path)
 
 

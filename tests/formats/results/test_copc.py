@@ -168,6 +168,6 @@ def test_a_raster_of_heights_keeps_its_vertical_system(tmp_path):
     write_surface(tmp_path / "dsm.tif", z, z * 1e-3, Grid(20, 30, LEFT, BOTTOM, 1.0, 1.0),
                   crs_of_heights("EPSG:25832+7837"), "DSM Z, m")  # fmt: skip
     with RasterReader(tmp_path / "dsm.tif") as reader:
-        assert reader.epsg == 25832
+        assert reader.plan == "EPSG:25832"
         assert "DHHN2016" in reader.crs.to_wkt()
     assert crs_of_heights("local") is None

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.crs_text import plan_of
 from aerotri.formats.results.pickets import read_pickets
 from aerotri.formats.results.point_cloud import read_point_cloud, refuse_cloud_units, system_of_cloud
 from aerotri.rasters.grids import RasterReader
@@ -30,7 +31,7 @@ class HeightSource:
     ----------
     heights : to be asked. area : (2, 2) m, lower left and upper right corner of what it covers.
     cell : m, its typical cell.
-    crs : 'EPSG:n', 'EPSG:n+m' where a system of the heights is stated, '' where not known.
+    crs : as of `crs_text`, '' where not stated.
     note : what was done to bring it to metres, '' for nothing.
     """
 
@@ -41,10 +42,9 @@ class HeightSource:
     crs: str = ""
 
     @property
-    def epsg(self) -> int | None:
-        """Code of its CRS, None where not known."""
-        plan = self.crs.partition("+")[0]
-        return int(plan.removeprefix("EPSG:")) if plan else None
+    def plan(self) -> str:
+        """Its CRS in X and Y, '' where not known."""
+        return plan_of(self.crs)
 
 
 def file_of_surface(path: Path) -> Path:
@@ -61,8 +61,8 @@ def common_crs(*paths: Path) -> str | None:
             continue
         with RasterReader(file) as reader:
             if units_of(reader).plan == "metre":
-                if reader.epsg is not None:
-                    return f"EPSG:{reader.epsg}"
+                if reader.plan:
+                    return reader.plan
             else:
                 wanted = wanted or metric_crs_for(reader)
     return wanted
@@ -114,11 +114,11 @@ def heights_of_raster(reader: MetricReader | HeldRaster) -> HeightSource:
     if g.rows * g.columns > LARGEST_HELD:
         left, bottom, right, top = g.bounds
         area = np.array([[left, bottom], [right, top]])
-        return HeightSource(FileHeights(reader), area, g.cell_x, reader.note, reader.crs_code)
+        return HeightSource(FileHeights(reader), area, g.cell_x, reader.note, reader.system)
     z = reader.read(0, 0, g.rows, g.columns).astype(float)
     known_rows, known_columns = np.isfinite(z).any(axis=1), np.isfinite(z).any(axis=0)
     if not known_rows.any():
         raise InputError("has no data", "give a raster with heights", reader.path)
     rows, columns = np.flatnonzero(known_rows)[[0, -1]], np.flatnonzero(known_columns)[[0, -1]]
     area = np.array([[g.x(columns[0]), g.y(rows[1])], [g.x(columns[1]), g.y(rows[0])]], dtype=float)
-    return HeightSource(RasterHeights(g, z), area, g.cell_x, reader.note, reader.crs_code)
+    return HeightSource(RasterHeights(g, z), area, g.cell_x, reader.note, reader.system)

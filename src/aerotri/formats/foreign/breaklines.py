@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.crs_text import plan_of
 from aerotri.vectors.crs import VectorSystem, system_of_geojson, vector_system
 from aerotri.vectors.geojson import LARGEST_M, crs_of_name, read_geojson
 from aerotri.vectors.geopackage import read_geopackage
@@ -39,7 +40,7 @@ def breaklines_and_note(path: Path, crs: str | None = None) -> tuple[tuple[np.nd
         raise InputError("is of no known kind", "give breaklines as .gpkg, .geojson or .dxf", path)
     if not path.is_file():
         raise InputError("there is no such file", "give breaklines as .gpkg, .geojson or .dxf", path)
-    parts, system = reader(path, None if crs is None else int(crs.rpartition(":")[2]))
+    parts, system = reader(path, plan_of(crs or ""))
     lines = [np.asarray(line, dtype=float) for line in parts]
     for number, line in enumerate(lines, start=1):
         if line.ndim != 2 or line.shape[1] < 3:
@@ -52,7 +53,7 @@ def breaklines_and_note(path: Path, crs: str | None = None) -> tuple[tuple[np.nd
     return tuple(lines), system.note
 
 
-def _of_geojson(path: Path, epsg: int | None) -> tuple[list[np.ndarray], VectorSystem]:
+def _of_geojson(path: Path, crs: str) -> tuple[list[np.ndarray], VectorSystem]:
     name, features = read_geojson(path)
     lines = []
     for feature in features:
@@ -62,10 +63,10 @@ def _of_geojson(path: Path, epsg: int | None) -> tuple[list[np.ndarray], VectorS
                 width = min((len(position) for position in line), default=0)
                 lines.append(np.array([position[:width] for position in line], dtype=float).reshape(len(line), width))
     xy = np.concatenate([line[:, :2] for line in lines if len(line)] or [np.zeros((0, 2))])
-    return lines, system_of_geojson(crs_of_name(name), xy, epsg, path.name)
+    return lines, system_of_geojson(crs_of_name(name), xy, crs, path.name)
 
 
-def _of_dxf(path: Path, epsg: int | None) -> tuple[list[np.ndarray], VectorSystem]:
+def _of_dxf(path: Path, crs: str) -> tuple[list[np.ndarray], VectorSystem]:
     """A drawing names no CRS: its coordinates are those of the block."""
     return list(_lines_of_dxf(path)), VectorSystem()
 
@@ -97,10 +98,10 @@ def _entities(path: Path) -> Iterator[np.ndarray]:
         yield np.vstack([points, points[:1]]) if entity.closed else points
 
 
-def _of_geopackage(path: Path, epsg: int | None) -> tuple[list[np.ndarray], VectorSystem]:
+def _of_geopackage(path: Path, crs: str) -> tuple[list[np.ndarray], VectorSystem]:
     lines, systems = [], {}
     for _, srs, rows in read_geopackage(path):
-        systems[srs] = vector_system(None if srs is None else f"EPSG:{srs}", epsg, path.name)
+        systems[srs] = vector_system(srs, crs, path.name)
         if len(systems) > 1:
             raise InputError("has layers in several CRS", "give one layer", path)
         for row in rows:

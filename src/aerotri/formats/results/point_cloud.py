@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.crs_text import crs_text
 from aerotri.formats.results.copc import write_copc
 from aerotri.formats.results.las_header import check_las
 from aerotri.vectors.geojson import LARGEST_M
@@ -143,7 +144,7 @@ class PreciseCloud:
     ----------
     xyz : (n, 3) m. covariance : (n, 6) m², XX, YY, ZZ, XY, XZ, YZ; None where the points have no σ.
     matching : (n,) m, σ of Z by matching alone; photographs : (n,) that measured a point; None where not stated.
-    crs : 'EPSG:n', 'EPSG:n+m' where a height system is stated, '' without a code.
+    crs : see `crs_text`.
     """
 
     xyz: np.ndarray
@@ -174,7 +175,7 @@ def read_precise_cloud(path: Path) -> PreciseCloud:
         matching, photographs = (
             np.asarray(cloud[name], dtype=float) if name in there else None for name in (OF_MATCHING, OF_PHOTOGRAPHS)
         )
-        system = _code_of(cloud.header.parse_crs())
+        system = crs_text(cloud.header.parse_crs())
     except BaseException as error:
         _refuse_damaged(error, path)
     if not {"sigma_x", "sigma_y", "sigma_z"} <= there:
@@ -185,20 +186,14 @@ def read_precise_cloud(path: Path) -> PreciseCloud:
     return PreciseCloud(xyz, covariance, matching, photographs, system)
 
 
-def _code_of(crs: CRS | None) -> str:
-    systems = [] if crs is None else [one.to_epsg() for one in (crs.sub_crs_list if crs.is_compound else [crs])]
-    known = [str(code) for code in systems if code is not None] if systems and systems[0] is not None else []
-    return f"EPSG:{'+'.join(known)}" if known else ""
-
-
 def system_of_cloud(path: Path) -> str:
-    """'EPSG:n' of a LAS or LAZ file, 'EPSG:n+m' where a height system is stated, '' without a code.
+    """The CRS of a LAS or LAZ file, see `crs_text`.
 
     Raises
     ------
     InputError
     """
-    return _code_of(_crs_of(path))
+    return crs_text(_crs_of(path))
 
 
 def _crs_of(path: Path) -> CRS | None:
