@@ -66,7 +66,7 @@ def test_files_hold_the_same_surface(made):
     np.testing.assert_array_equal(known, count >= 2)
     assert (sigma[known] >= matching[known]).all()
     assert np.median(sigma[known]) == pytest.approx(content["sigma_Z_m"]["median"], rel=1e-3)
-    xyz, _ = read_point_cloud(here / "dsm" / "dsm.laz")
+    xyz = read_point_cloud(here / "dsm" / "dsm.laz").xyz
     np.testing.assert_allclose(np.sort(xyz[:, 2]), np.sort(z[known]), atol=6e-4)
     assert {path.stem for path in (here / "dsm" / "plots").glob("*.png")} == {
         "surface", "colours", "sigma", "photographs"

@@ -126,7 +126,8 @@ def test_point_clouds(tmp_path):
     xyz = rng.uniform(0.0, 50.0, (100, 3)) + [4e5, 5e6, 100.0]
     ground = rng.random(100) < 0.5
     write_point_cloud(tmp_path / "a.laz", xyz, np.full(100, 0.02), ground, "EPSG:25832")
-    found, classes = read_point_cloud(tmp_path / "a.laz")
+    read = read_point_cloud(tmp_path / "a.laz")
+    found, classes = read.xyz, read.classes
     np.testing.assert_allclose(found, xyz, atol=6e-4)
     np.testing.assert_array_equal(classes == 2, ground)
     (tmp_path / "b.laz").write_bytes(b"no cloud")

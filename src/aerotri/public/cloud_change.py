@@ -244,7 +244,7 @@ def cloud_change(
         raise InputError("the two clouds do not meet", "check the CRS of both, or give a larger --cylinder and --reach")
     stated = (first_adjustment, second_adjustment)
     found, adjusted, said, is_known = by_adjustments(found, epochs, (before, after), stated, crs)
-    notes = [text for text in (of_heights, unlike, *said) if text]
+    notes = [text for text in (*(one.note for one in epochs), of_heights, unlike, *said) if text]
     held = None if stable is None else within(stable, crs, core)
     on_stable = None if held is None else registration_of(found, held)
     if on_stable is not None and not np.isfinite(on_stable[1]):

@@ -33,12 +33,18 @@ BYTES_OF_POINT = 270
 
 @dataclass(frozen=True, eq=False)
 class CloudEpoch:
-    """A cloud with its CRS, its name, and the key of the adjustment it was measured with, '' where nothing says so."""
+    """A cloud with its CRS and name.
+
+    Parameters
+    ----------
+    key : of the adjustment it was measured with, '' where nothing says so. note : what was left out of it, in words.
+    """
 
     cloud: Cloud
     crs: str
     label: str
     key: str = ""
+    note: str = ""
 
 
 def is_cloud(path: Any) -> bool:
@@ -82,7 +88,8 @@ def _of_file(path: Path) -> CloudEpoch:
     stated = content.get("noise_length_m")
     length = float(stated) if isinstance(stated, int | float) and 0.0 <= stated < np.inf else None
     cloud = Cloud(read.xyz, read.covariance, read.matching, read.photographs, length)
-    return CloudEpoch(cloud, read.crs, path.name, str(content.get("adjustment", "")))
+    note = read.note and f"{path.name}: {read.note}"
+    return CloudEpoch(cloud, read.crs, path.name, str(content.get("adjustment", "")), note)
 
 
 def _beside(path: Path) -> dict[str, Any]:

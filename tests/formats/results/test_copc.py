@@ -145,7 +145,7 @@ def test_a_few_cells_and_a_single_one(tmp_path):
         low = few.xyz.min(axis=0) - [CELL / 2, CELL / 2, 0.0]
         high = few.xyz.max(axis=0) + [CELL / 2, CELL / 2, 0.0]
         write_surface_cloud(tmp_path / "few.laz", [few], octree_over(low, high, CELL), None)
-        assert len(read_point_cloud(tmp_path / "few.laz")[0]) == count
+        assert len(read_point_cloud(tmp_path / "few.laz").xyz) == count
         with laspy.copc.CopcReader.open(str(tmp_path / "few.laz")) as reader:
             assert len(reader.query()) == count
 

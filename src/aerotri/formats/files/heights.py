@@ -80,13 +80,14 @@ def heights_of_file(path: Path, stack: ExitStack, crs: str | None) -> HeightSour
     InputError
         When the file is missing, of no known kind, or holds no surface.
     """
-    path, system = file_of_surface(path), ""
+    path, system, note = file_of_surface(path), "", ""
     if not path.is_file():
         raise InputError("there is no such file", KINDS, path)
     if path.suffix.lower() in RASTERS:
         return heights_of_raster(stack.enter_context(MetricReader(path, target=crs)))
     if path.suffix.lower() in CLOUDS:
-        xyz = read_point_cloud(path)[0]
+        cloud = read_point_cloud(path)
+        xyz, note = cloud.xyz, cloud.note and f"{path.name}: {cloud.note}"
         refuse_cloud_units(path)
         system = system_of_cloud(path)
     elif path.suffix.lower() == ".parquet":
@@ -99,7 +100,7 @@ def heights_of_file(path: Path, stack: ExitStack, crs: str | None) -> HeightSour
     except InputError as error:
         raise InputError(error.message, error.remedy, path) from error
     area = np.array([xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)])
-    return HeightSource(surface, area, float(np.sqrt(np.prod(area[1] - area[0]) / len(xyz))), "", system)
+    return HeightSource(surface, area, float(np.sqrt(np.prod(area[1] - area[0]) / len(xyz))), note, system)
 
 
 def heights_of_raster(reader: MetricReader | HeldRaster) -> HeightSource:

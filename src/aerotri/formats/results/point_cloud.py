@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from aerotri.formats.results.copc import Octree
     from aerotri.terrain.dense.points import SurfacePoints
 
-UNCLASSIFIED, GROUND = 1, 2
+UNCLASSIFIED, GROUND, NOISE = 1, 2, (7, 18)
 """Classes of points [L: ASPRS LAS 1.4]."""
 SCALE_M = 0.001
 """Step of the coordinates, m, which LAS keeps as whole numbers; chosen [C]: 1 mm is below σ of every picket, and 32
@@ -100,8 +100,31 @@ def _surface_fields(part: SurfacePoints) -> tuple[np.ndarray, ...]:
     )  # fmt: skip
 
 
-def read_point_cloud(path: Path, parallel: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) m of a LAS or LAZ file and their classes (n,).
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """The points of a LAS or LAZ file that are to be used.
+
+    Parameters
+    ----------
+    xyz : (n, 3) m. classes : (n,). usable : (N,) bool of all points of the file; false of noise (classes 7 and 18) and
+        of points that are withheld.
+    """
+
+    xyz: np.ndarray
+    classes: np.ndarray
+    usable: np.ndarray
+
+    @property
+    def note(self) -> str:
+        """How many were left out, '' where none was."""
+        left = int(np.count_nonzero(~self.usable))
+        if not left:
+            return ""
+        return f"{left} of {len(self.usable)} points are marked as noise (class 7 or 18) or withheld: left out"
+
+
+def read_point_cloud(path: Path, parallel: bool = True) -> PointCloud:
+    """The points of a LAS or LAZ file, without noise and those that are withheld.
 
     Parameters
     ----------
@@ -119,11 +142,14 @@ def read_point_cloud(path: Path, parallel: bool = True) -> tuple[np.ndarray, np.
         cloud = laspy.read(path, laz_backend=backends)
         xyz = np.column_stack([np.asarray(axis, dtype=float) for axis in (cloud.x, cloud.y, cloud.z)])
         classes = np.asarray(cloud.classification)
+        usable = ~(np.isin(classes, NOISE) | np.asarray(cloud.withheld, dtype=bool))
     except BaseException as error:
         _refuse_damaged(error, path)
     if not (np.abs(xyz) <= LARGEST_M).all():
         raise InputError("has points at no possible place", "write the file anew, its scale or offset is damaged", path)
-    return xyz, classes
+    if len(usable) and not usable.any():
+        raise InputError("has no points but noise (class 7 or 18) and withheld ones", "give a cloud of points", path)
+    return PointCloud(xyz[usable], classes[usable], usable)
 
 
 def _refuse_damaged(error: BaseException, path: Path) -> NoReturn:
@@ -144,7 +170,7 @@ class PreciseCloud:
     ----------
     xyz : (n, 3) m. covariance : (n, 6) m², XX, YY, ZZ, XY, XZ, YZ; None where the points have no σ.
     matching : (n,) m, σ of Z by matching alone; photographs : (n,) that measured a point; None where not stated.
-    crs : see `crs_text`.
+    crs : see `crs_text`. note : what was left out, '' for nothing.
     """
 
     xyz: np.ndarray
@@ -152,6 +178,7 @@ class PreciseCloud:
     matching: np.ndarray | None
     photographs: np.ndarray | None
     crs: str
+    note: str
 
 
 def read_precise_cloud(path: Path) -> PreciseCloud:
@@ -165,25 +192,29 @@ def read_precise_cloud(path: Path) -> PreciseCloud:
     """
     import laspy
 
-    xyz, _ = read_point_cloud(path)
+    read = read_point_cloud(path)
+    xyz, usable = read.xyz, read.usable
     refuse_cloud_units(path)
     try:
         cloud = laspy.read(path)
         there = set(cloud.point_format.dimension_names)
         names = ("sigma_x", "sigma_y", "sigma_z", "cov_xy", "cov_xz", "cov_yz")
-        columns = [np.asarray(cloud[name], dtype=float) if name in there else np.zeros(len(xyz)) for name in names]
+        columns = [
+            np.asarray(cloud[name], dtype=float)[usable] if name in there else np.zeros(len(xyz)) for name in names
+        ]
         matching, photographs = (
-            np.asarray(cloud[name], dtype=float) if name in there else None for name in (OF_MATCHING, OF_PHOTOGRAPHS)
+            np.asarray(cloud[name], dtype=float)[usable] if name in there else None
+            for name in (OF_MATCHING, OF_PHOTOGRAPHS)
         )
         system = crs_text(cloud.header.parse_crs())
     except BaseException as error:
         _refuse_damaged(error, path)
     if not {"sigma_x", "sigma_y", "sigma_z"} <= there:
-        return PreciseCloud(xyz, None, None, None, system)
+        return PreciseCloud(xyz, None, None, None, system, read.note)
     covariance = np.column_stack([*(column**2 for column in columns[:3]), *columns[3:]])
     if not np.isfinite(covariance).all() or (matching is not None and not np.isfinite(matching).all()):
         raise InputError("has points whose σ is not a number", "write the cloud anew", path)
-    return PreciseCloud(xyz, covariance, matching, photographs, system)
+    return PreciseCloud(xyz, covariance, matching, photographs, system, read.note)
 
 
 def system_of_cloud(path: Path) -> str:
