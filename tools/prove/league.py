@@ -74,7 +74,7 @@ def of_dbat(folder: str) -> Callable[[Path], list[Stated]]:
 
 ENTRIES = {
     "dbat_sxb": Entry("dbat_sxb", "none", others=of_dbat("dbat_sxb"), notes=(
-        "pycolmap has one σ for all image points; DBAT and ours have 0.5 px for marks and 1 px for the others.",)),
+        "pycolmap has one σ for all image points; DBAT and aerotri have 0.5 px for marks and 1 px for the others.",)),
     "dbat_roma": Entry("dbat_roma", "lens:k1+k2", others=of_dbat("dbat_roma"), default=None, notes=(
         "Datum of all but pycolmap as it comes: one photograph and one coordinate of another held.",
         "DBAT: K1 and K2 of Brown at the measured points; k1 and k2 of the others act on the ideal ones.",
