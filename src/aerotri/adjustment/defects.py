@@ -77,8 +77,8 @@ def without_digits(system: NormalSystem, equations: NormalEquations) -> str:
     ray = int(np.argmax(np.where(np.isnan(length), np.inf, length)))
     point, image = u.block.image_points.point[u.rays.source[ray]], u.images[u.rays.image[ray]]
     return (
-        f"{WRONG_START} point {u.block.points[point]} stands beside photograph {u.block.images.names[image]} or in it, "
-        "not before it. Check the orientations of this photograph and of the others that the point is measured in"
+        f"{WRONG_START} point {u.block.points[point]} lies beside or behind photograph {u.block.images.names[image]}, "
+        "not in front of it. Check the orientations of this photograph and of the others that the point is measured in"
     )
 
 

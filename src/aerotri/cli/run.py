@@ -104,7 +104,7 @@ def run(
         bool,
         typer.Option(
             "--go-on",
-            help="Go on after an adjustment that was rejected, or without a place that can be trusted.",
+            help="Go on after a rejected adjustment, or if the place of the block cannot be trusted.",
             rich_help_panel=METHOD,
         ),
     ] = False,

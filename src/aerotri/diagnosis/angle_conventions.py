@@ -70,7 +70,10 @@ def of_axes(order: str) -> Iterator[Convention]:
     yield Convention("180° added to omega", changes.plus(np.array([np.pi, 0.0, 0.0])))
     yield Convention("180° added to phi", changes.plus(np.array([0.0, np.pi, 0.0])))
     yield made("y of the camera taken as pointing down, z forward", lambda rotation: rotation @ down)
-    yield made("the rotation from ground to camera taken for what it is", lambda rotation: np.swapaxes(rotation, 1, 2))
+    yield made(
+        "angles that turn from ground to camera, not from camera to ground",
+        lambda rotation: np.swapaxes(rotation, 1, 2),
+    )
     north_east_down = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
     yield made("axes of the ground taken as north, east, down", lambda rotation: north_east_down @ rotation)
     yield made(

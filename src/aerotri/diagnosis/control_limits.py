@@ -22,11 +22,11 @@ def of_control(adjusted: AdjustedBlock) -> list[Finding]:
     if not hidden:
         return []
     remedy = (
-        "Check points of another survey show it, if they have another base point, another pole and other marks"
+        "Check points of another survey show them, if they have another base point, another pole and other marks"
         if checked
-        else "Check points show it, measured from another base point, with another pole, and on other marks"
+        else "Check points show them, if measured from another base point, with another pole, and on other marks"
     )
-    says = f"No residual shows: {'; '.join(hidden)}. {remedy}"
+    says = f"No residual shows errors such as: {'; '.join(hidden)}. {remedy}"
     held = (
         "control points alone" if not positions else "GNSS alone" if not len(adjusted.control) else "control and GNSS"
     )
@@ -50,12 +50,12 @@ def what_is_hidden(adjusted: AdjustedBlock) -> list[str]:
     elif positions and not control:
         hidden = ["an error that all positions share: a wrong base station, another datum, a wrong geoid"]
         if free_c:
-            hidden.append("a shift of all heights that a principal distance takes up")
+            hidden.append("a shift of all heights: the free principal distance absorbs it")
     elif positions and (free_c or _shift_is_free(adjusted)):
         hidden = [
             "an error in height that all control points share, such as a wrong height of the pole: "
             + ("the principal distance" if free_c else "the shift of the GNSS positions")
-            + " takes it up, against the heights of GNSS"
+            + " absorbs it, against the heights of GNSS"
         ]
     return hidden
 

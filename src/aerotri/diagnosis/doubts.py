@@ -102,7 +102,7 @@ def _wrong_start_in_words(system: NormalSystem, start: State) -> str:
     if not np.median(missed / format_mm) > MISSED_START:
         return ""
     return (
-        f"the start values do not fit, by them the image points are missed by {np.median(missed / pixel):.3g} px "
+        f"the start values do not fit: they miss the image points by {np.median(missed / pixel):.3g} px "
         "(median). Check the orientations, their angles and axes, and the axes of the image points"
     )
 
@@ -137,9 +137,10 @@ def too_good_in_words(result: AdjustedBlock) -> tuple[str, ...]:
     if rms < NO_RESIDUALS_PX:
         return (
             f"there are no residuals: the image points fit to {rms:.1e} px (RMS), as no measured ones do. They were "
-            "computed, not measured; σ0 and all σ that follow from it say nothing of what measurements would give",
+            "computed, not measured; σ0 and all σ that follow from it say nothing about real measurements",
         )
     return (
         f"σ0 is {o.sigma0:.2g}: the residuals are {times(1.0 / o.sigma0)} smaller than the stated σ, which are far too "
-        "large. State σ as they are: they decide what control, positions and image points weigh against each other",
+        "large. State the σ that the measurements really have: they decide how much control, positions and image "
+        "points count against one another",
     )

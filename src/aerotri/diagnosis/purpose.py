@@ -51,7 +51,7 @@ def purpose(adjusted: AdjustedBlock) -> Purpose:
     """
     relative, pixel = adjusted.relative, ground_pixel(adjusted)
     if adjusted.outcome.verdict == "rejected":
-        return Purpose(NEITHER, "A rejected result is good for nothing but to find the error.")
+        return Purpose(NEITHER, "A rejected result serves only to find the error.")
     if relative is None or not np.isfinite(pixel) or not np.isfinite(relative.medians).all():
         return Purpose()
     free = not np.isfinite(relative.position).all()

@@ -100,10 +100,10 @@ def _replaced(local: Block, given: Orientations, made: Replacement) -> tuple[str
     said, turned = [], np.degrees(given.turned_to(made.orientations))
     for convention, rows in _alike(local, made):
         off = f"{turned[rows[0]]:.0f}°" if len(rows) == 1 else f"{np.median(turned[rows]):.0f}° (median)"
-        agree = "" if convention is None else f"; they agree with {convention.remedy}"
+        agree = "" if convention is None else f"; with {convention.remedy} they agree"
         said.append(
-            f"start angles of {photographs_in_words(local, rows)} were not used: they are {off} off what the tie "
-            f"points give, which were taken instead{agree}"
+            f"start angles of {photographs_in_words(local, rows)} were not used: they are {off} off those of the "
+            f"tie points, which were used instead{agree}"
         )
     return tuple(said)
 

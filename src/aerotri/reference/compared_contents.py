@@ -73,7 +73,7 @@ COMPARE_PARAMETERS = (
     Item(
         "sets[].bends.leverage",
         "number",
-        "By how much more than the image points, changed as these two sets change them, could move the object if the "
+        "How many times farther the object differs between the two sets than their image points could move it if the "
         "photographs stayed where they are.",
     ),
     *_gain("sets[].behind", "How it stands against the best of all sets; null where it has no result."),

@@ -19,7 +19,7 @@ ACCURACY = within(
         "rmse_h_m",
         "number",
         "RMS of the errors in plan to be expected over the area; the RMSE_H of a test has the "
-        "error of its check points besides.",
+        "error of its check points in addition.",
         "m",
     ),
     Item("rmse_v_m", "number", "The same in height.", "m"),

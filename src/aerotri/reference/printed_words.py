@@ -22,7 +22,7 @@ PRINTED_WORDS = (
     Word(
         "RMSE_H", "aerotri adjust",
         "Horizontal root mean square error at the check points, √(RMSE_X² + RMSE_Y²), with the error of their survey: "
-        "RMSE = √(RMS² + survey²) by coordinate (ASPRS, edition 2). The RMS alone is called in plan.",
+        "RMSE = √(RMS² + survey²) by coordinate (ASPRS, edition 2). Without it the number is called in plan.",
     ),
     Word(
         "RMSE_V", "aerotri adjust",

@@ -106,7 +106,7 @@ DSM_JSON = (
         "scale) of it; for shape and volumes.",
         "m",
     ),
-    Item("sigma_Z_m.adjustment_relative", "number", "Of it from the adjustment alone.", "m"),
+    Item("sigma_Z_m.adjustment_relative", "number", "The part of it that comes from the adjustment.", "m"),
     Item(
         "noise_length_m",
         "number?",

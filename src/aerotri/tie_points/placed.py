@@ -80,7 +80,7 @@ class Placed:
         used = [point for point in self.compared if point.used]
         median = float(np.median([point.misfit for point in self.compared]))
         why = (
-            f"they miss it by {median:.3g} m (median), {100 * self.bend:.2g} % of their extent or more"
+            f"the misfits are {median:.3g} m (median), {100 * self.bend:.2g} % of their extent or more"
             if self.agreed
             else f"only {len(used)} of {len(self.compared)} agree with one another"
         )

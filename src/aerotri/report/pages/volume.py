@@ -122,7 +122,7 @@ def _of_the_whole(c: Mapping[str, Any]) -> str:
     a = c.get("adjusted")
     if not a:
         return ""
-    text = " σ comes from the whole covariance of the adjustment, so that it holds what matters for a volume: "
+    text = " σ comes from the whole covariance of the adjustment, so that it contains what matters for a volume: "
     text += (
         "the base follows from the surface, and a shift or a tilt of the whole block cancels."
         if c["base"].get("follows_surface")
@@ -130,7 +130,7 @@ def _of_the_whole(c: Mapping[str, Any]) -> str:
     )
     if a["scale"] is not None:
         length, volume = (two_digits(100.0 * share * a["scale"]) for share in (1.0, PER_VOLUME))
-        text += f" The scale of the block is known to ± {length} %, which is ± {volume} % of a volume; σ has it."
+        text += f" The scale of the block is known to ± {length} %, which is ± {volume} % of a volume; σ contains this."
     shape = only_shape(c)
     return f"{text} The adjustment: {shape}" if shape else text
 
