@@ -117,6 +117,20 @@ def test_where_the_iterations_ended_is_no_error_of_the_strips():
         assert field.sigma < unit
 
 
+def test_no_field_is_far_larger_than_what_the_residuals_allow():
+    """Scores five times as large as noise in all patterns alike, as errors of single photographs make them."""
+    camera, unit = small_block(seed=1)[0].cameras[0], 0.0007
+    for seed in (1, 2, 3):
+        rng = np.random.default_rng(seed)
+        patterns = np.linalg.qr(rng.normal(size=(70, 70)))[0]
+        values = 3e8 * np.geomspace(1e-6, 1.0, 70)
+        z = 5.0 * rng.normal(size=70)
+        normals, scores = (patterns * values) @ patterns.T, patterns @ (np.sqrt(values) * z)
+        field = fit_field(normals, scores, np.zeros(1, int), False, [camera], unit, 1.0)
+        # of the residuals alone image errors of half a σ would do
+        assert field.sigma < 5.0 * unit
+
+
 def test_errors_that_all_strips_share_do_not_move():
     """A lens error that the parameters do not describe, the same in three strips."""
     block, _ = few_strips(2)

@@ -11,7 +11,7 @@ from aerotri.observations.block import Control
 from aerotri.pipeline.chain import adjust_keeping_system
 from aerotri.statistics.cluster_influence import influences, known_part
 from aerotri.statistics.cluster_test import compare_clusters, sum_of_squares, weakest_modes
-from aerotri.statistics.clusters import CAMERA, PHOTOGRAPH, Clusters, cluster_schemes, to_test
+from aerotri.statistics.clusters import CAMERA, PHOTOGRAPH, VIEW, Clusters, cluster_schemes, to_test
 from aerotri.statistics.covariance import cofactors
 from aerotri.statistics.model_part import compare_schemes, excess_of_clusters, positive_part, squares_by
 from dense_algebra import dense_design
@@ -272,6 +272,27 @@ def test_heads_of_a_rig_fly_the_strips_of_the_rig(named):
         if scheme in schemes:
             for one in set(station.tolist()):
                 assert len(set(schemes[scheme].label[station == one].tolist())) == 1
+
+
+def test_photographs_around_an_object_are_no_strips():
+    """Sixteen photographs on a circle, and a facade photographed up and down: divided by their direction of view."""
+    block = small_block(3)[0]
+    n = len(block.images)
+    turn = np.linspace(0.0, 2.0 * np.pi, n, endpoint=False)
+    ring = 30.0 * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(n)])
+    angles = np.column_stack([np.full(n, np.pi / 2.0), turn + np.pi / 2.0, np.zeros(n)])
+    nameless = np.full(n, "", dtype=object)
+    images = replace(block.images, centre=ring, angles=angles, strip=nameless)
+    around = replace(block, images=images, rotation="omega-phi-kappa")
+    schemes = {one.scheme: one for one in cluster_schemes(around, np.arange(n), ring)}
+    assert set(schemes) == {VIEW, PHOTOGRAPH}
+    assert len(schemes[VIEW]) >= 6
+    # flown in two straight strips the same photographs are strips again
+    way = np.column_stack([np.arange(n) % (n // 2) * 10.0, np.arange(n) // (n // 2) * 20.0, np.zeros(n)])
+    way[n // 2 :, 0] = way[n // 2 :, 0][::-1]
+    flown = {one.scheme for one in cluster_schemes(around, np.arange(n), way)}
+    assert "strip" in flown
+    assert VIEW not in flown
 
 
 def test_photographs_are_tested_in_more_clusters_than_their_variance_is_taken_from():

@@ -4,10 +4,19 @@ from __future__ import annotations
 
 from aerotri.diagnosis.finding import Finding, times
 from aerotri.results.adjusted_block import AdjustedBlock
-from aerotri.results.model_part import FIELD, ModelPart
+from aerotri.results.model_part import FIELD, OF_CONTROL, ControlEvidence, ModelPart
 
 WORTH_SAYING = 1.1
 """σ total over σ from which the model part is told [C]: below, it changes no decision."""
+
+
+UNLIKELY = 0.05
+"""Probability of contradictions of control below which they are told [C]: what to look at, no reason to refuse."""
+
+
+def percent(p: float) -> str:
+    """A probability in words."""
+    return f"{100.0 * p:.0f} %" if p >= 0.01 else "less than 1 %"
 
 
 def model_part_in_words(part: ModelPart) -> str:
@@ -15,6 +24,12 @@ def model_part_in_words(part: ModelPart) -> str:
     if not part.counts or max(part.ratio_plan, part.ratio_height) < WORTH_SAYING:
         return ""
     plan, height = (f"{ratio:.1f} times" for ratio in (part.ratio_plan, part.ratio_height))
+    if part.method == OF_CONTROL and part.control is not None:
+        return (
+            f"the control points contradict one another and the photographs {part.control.ratio:.1f} times as much as "
+            f"noise explains: from the noise alone heights would look {height} and positions {plan} too sure. The "
+            "total σ (tX, tY, tZ) contain this"
+        )
     return (
         f"the errors of the photographs change {part.change}, more than noise explains: from the "
         f"noise alone heights would look {height} and positions {plan} too sure. The total σ (tX, tY, tZ) contain "
@@ -33,6 +48,34 @@ def _by_field(part: ModelPart) -> str:
     group = "strip" if part.scheme == "strip" else "group"
     of = "" if group == part.scheme else f" ({part.scheme})"
     return f". {part.clusters} {group}s{of} are too few for a comparison. {shown} in every {group}"
+
+
+def control_in_words(control: ControlEvidence | None) -> str:
+    """What a surveyor has to know of contradictions of control, '' where σ explains them."""
+    if control is None or not control.p < UNLIKELY or not control.left_out > WORTH_SAYING:
+        return ""
+    total = control.left_out_total
+    in_total = f", {total:.1f} times their total σ" if abs(total - control.left_out) > 0.05 else ""
+    return (
+        "σ may be too small at the control points. Left out in turn, they miss by "
+        f"{control.left_out:.1f} times their σ (RMS){in_total}. Chance does this in {percent(control.p)} of blocks. "
+        "Look at the σ of their coordinates, at their marks in the photographs, and try other additional parameters"
+    )
+
+
+def of_control(adjusted: AdjustedBlock) -> list[Finding]:
+    """Control points against one another and the photographs."""
+    control = None if adjusted.model_part is None else adjusted.model_part.control
+    if control is None or not control.freedom:
+        return []
+    value = f"{times(control.ratio)} as large as σ explains"
+    text = f"about 1; {control.freedom} contradictions"
+    says = control_in_words(control)
+    return [
+        Finding(
+            "contradictions of control points", value, text, says or "σ explains them", "attention" if says else "good"
+        )
+    ]
 
 
 def of_model_part(adjusted: AdjustedBlock) -> list[Finding]:

@@ -33,6 +33,7 @@ RULES: tuple[Rule, ...] = (
     check_points.of_check_points,
     check_points.of_means,
     moving_errors.of_model_part,
+    moving_errors.of_control,
     common_shift.of_common_shift,
     common_motion.of_common_motion,
     control_digits.of_digits,

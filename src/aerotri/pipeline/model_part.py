@@ -3,25 +3,42 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
-from aerotri.diagnosis.moving_errors import model_part_in_words
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.solve import Solution
+from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.diagnosis.moving_errors import control_in_words, model_part_in_words
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.in_crs import with_model_of
-from aerotri.results.model_part import FIELD, GROUPS, ModelPart
+from aerotri.results.model_part import CONTROL, FIELD, GROUPS, OF_CONTROL, ModelPart
 from aerotri.statistics.cluster_fields import fitted_field, root_of_field
-from aerotri.statistics.cluster_test import LEVEL
+from aerotri.statistics.cluster_test import ATTRIBUTED, LEVEL
 from aerotri.statistics.clusters import cluster_schemes
+from aerotri.statistics.common_modes import common_parts
+from aerotri.statistics.control_evidence import (
+    FREEDOM_OF_FIELDS,
+    ControlEquations,
+    along_model,
+    control_equations,
+    evidence,
+    growth_by_control,
+    model_of_control,
+    root_of_control,
+    scale_of_model,
+)
 from aerotri.statistics.covariance import cofactors, inner_datum
 from aerotri.statistics.model_part import (
+    Excess,
     chosen_scheme,
     compare_few,
     compare_schemes,
     excess_of_clusters,
     excess_of_root,
     growth_of,
+    of_few,
     spread_over_block,
     squares_by,
     why_none,
@@ -30,23 +47,62 @@ from aerotri.statistics.model_part import (
 )
 
 
+@dataclass(frozen=True, eq=False)
+class _Stage:
+    """An adjustment and its factor, and what its control points say (None where there are none)."""
+
+    found: Adjustment
+    factor: Factor
+    control: ControlEquations | None
+
+    @property
+    def equations(self) -> tuple[NormalSystem, Solution, Factor]:
+        return self.found.system, self.found.solution, self.factor
+
+    @property
+    def sigma0(self) -> float:
+        return self.found.local.outcome.sigma0
+
+    def again(self) -> _Stage:
+        """The same with a new factor, where another took its place."""
+        return replace(self, factor=self.found.system.factorise(self.found.solution.equations))
+
+
 def with_model_part(found: Adjustment) -> Adjustment:
     """The adjustment with the model part of σ where groups of photographs share errors; else why there is none."""
     begun = time.perf_counter()
     system, solution, sigma0 = found.system, found.solution, found.local.outcome.sigma0
     u = system.unknowns
-    reason = why_not(u.block.settings.adjustment.model_part, len(u.images), solution.status, sigma0)
+    settings = u.block.settings.adjustment
+    reason = why_not(settings.model_part, len(u.images), solution.status, sigma0)
     if reason:
         return _with(found, replace(found.local, model_part=ModelPart(reason=reason)), begun)
     factor = system.factorise(solution.equations)
-    centre = solution.state.centre
+    stage = _Stage(found, factor, None if settings.is_free else control_equations(system, solution, factor))
+    part, excess = _of_clusters(stage)
+    stage = stage if excess is None else stage.again()
+    part, excess = _with_control(stage, part, excess)
+    covariance = found.local.points.covariance[u.points]
+    if not settings.is_free:
+        model = None if excess is None else (excess.root, excess.points)
+        part = replace(part, common=common_parts(*stage.equations, covariance, sigma0, model))
+    if excess is None:
+        return _with(found, replace(found.local, model_part=part), begun)
+    part = with_ratios(part, growth_of(covariance, excess.points))
+    local = replace(spread_over_block(u, found.local, excess.images, excess.shared, excess.points), model_part=part)
+    return replace(_with(found, local, begun), model=excess.root)
+
+
+def _of_clusters(stage: _Stage) -> tuple[ModelPart, Excess | None]:
+    """The model part that groups of photographs show."""
+    system, solution, factor = stage.equations
+    u, sigma0, centre = system.unknowns, stage.sigma0, solution.state.centre
     schemes = cluster_schemes(u.block, u.images, centre)
     tests = compare_schemes(schemes, centre, sigma0, partial(squares_by, system, solution, factor))
     tests, fields = compare_few(schemes, tests, centre, partial(fitted_field, system, solution, factor, sigma0))
-    part = ModelPart(level=LEVEL, tests=tests)
-    chosen = chosen_scheme(tests)
+    part, chosen = ModelPart(level=LEVEL, tests=tests), chosen_scheme(tests)
     if chosen is None:
-        return _with(found, replace(found.local, model_part=replace(part, reason=why_none(tests))), begun)
+        return replace(part, reason=why_none(tests)), None
     clusters = schemes[chosen]
     part = replace(part, scheme=clusters.scheme, clusters=len(clusters), method=FIELD if chosen in fields else GROUPS)
     inner = None
@@ -54,29 +110,50 @@ def with_model_part(found: Adjustment) -> Adjustment:
         inner = inner_datum(system, solution.state, factor, solution.estimator)
     if chosen in fields:
         root, squares = root_of_field(system, solution, factor, clusters, fields[chosen], inner)
-        excess = excess_of_root(system, solution, root, squares)
-    elif inner is not None:
-        q = cofactors(system, solution.state, factor, solution.estimator)
-        excess = excess_of_clusters(system, solution, factor, clusters, sigma0, (q.images, q.shared, q.points), inner)
+        return part, excess_of_root(system, solution, root, squares)
+    if inner is not None:
+        of_all = cofactors(system, solution.state, factor, solution.estimator)
+        q = of_all.images, of_all.shared, of_all.points
     else:
         of_images = factor.inverse_on_pattern().blocks[: len(u.images)].copy()
-        q = of_images, factor.border_inverse(), found.local.points.covariance[u.points] / sigma0**2
-        excess = excess_of_clusters(system, solution, factor, clusters, sigma0, q)
-    part = with_ratios(part, growth_of(found.local.points.covariance[u.points], excess.points))
-    local = replace(spread_over_block(u, found.local, excess.images, excess.shared, excess.points), model_part=part)
-    return replace(_with(found, local, begun), model=excess.root)
+        q = of_images, factor.border_inverse(), stage.found.local.points.covariance[u.points] / sigma0**2
+    return part, excess_of_clusters(system, solution, factor, clusters, sigma0, q, inner)
+
+
+def _with_control(stage: _Stage, part: ModelPart, excess: Excess | None) -> tuple[ModelPart, Excess | None]:
+    """The model part as large as control points show it, and what they show beside it."""
+    if stage.control is None:
+        return part, excess
+    system, solution, factor = stage.equations
+    of_groups = part.method == GROUPS
+    widening, scale = of_few(part.clusters) if of_groups else 1.0, 1.0
+    of_model = model_of_control(stage.control, None if excess is None else excess.root, widening, stage.sigma0)
+    power, squares = along_model(stage.control, of_model, stage.sigma0)
+    if excess is not None and len(squares):
+        scale = scale_of_model(power, squares, part.clusters - 1 if of_groups else FREEDOM_OF_FIELDS)
+        excess = excess.scaled(scale)
+    says = evidence(stage.control, scale * widening * of_model, stage.sigma0)
+    if says.p_total < (LEVEL if excess is None else ATTRIBUTED):
+        says = replace(says, growth=growth_by_control(says))
+        own = root_of_control(system, solution, factor, stage.control, says.growth, stage.sigma0)
+        beside = excess_of_root(system, solution, *own)
+        if excess is None:
+            part = replace(part, scheme=CONTROL, clusters=says.coordinates, method=OF_CONTROL, reason="")
+        excess = beside if excess is None else excess.beside(beside)
+    return replace(part, control=replace(says, scale=scale)), excess
 
 
 def _with(found: Adjustment, local: AdjustedBlock, begun: float) -> Adjustment:
     """The adjustment with the model part of `local` in both frames, told among the warnings, its time counted."""
-    said = model_part_in_words(local.model_part) if local.model_part is not None else ""
+    part = local.model_part or ModelPart()
+    said = [text for text in (model_part_in_words(part), control_in_words(part.control)) if text]
 
     def told(result: AdjustedBlock) -> AdjustedBlock:
         o = result.outcome
         timings = dict(o.timings_s)
         if "statistics" in timings:
             timings["statistics"] += time.perf_counter() - begun
-        warnings = o.warnings if not said or said in o.warnings else (*o.warnings, said)
+        warnings = (*o.warnings, *(text for text in said if text not in o.warnings))
         return replace(result, outcome=replace(o, warnings=warnings, timings_s=timings))
 
     local = told(with_model_of(local, local, None))

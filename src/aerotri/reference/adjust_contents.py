@@ -163,14 +163,16 @@ ADJUSTMENT = (
         "model_part.method",
         "text",
         "Where it is from. groups: the differences between the groups. field: random fields of image errors, where the "
-        "groups are fewer than five or one is too large. Empty where there is none.",
+        "groups are fewer than five or one is too large. control: contradictions of the control points. Empty where "
+        "there is none.",
     ),
     Item("model_part.level", "number?", "Probability with which noise alone is taken for common errors."),
     Item("model_part.tests[]", "object", "One entry a way to divide the photographs into groups."),
     Item(
         "model_part.tests[].scheme",
         "text",
-        "What makes a group: strip, direction of flight, photograph, or a column of images.csv.",
+        "What makes a group: strip, direction of flight (of view where there are no strips), photograph, or a column "
+        "of images.csv.",
     ),
     Item("model_part.tests[].clusters", "whole", "Number of groups; many strips are joined to fewer."),
     Item("model_part.tests[].freedom", "whole", "Degrees of freedom of the test."),
@@ -185,6 +187,61 @@ ADJUSTMENT = (
     Item("model_part.ratio_plan", "number", "Total σ over σ of the noise in X and Y, median of the points."),
     Item("model_part.ratio_height", "number", "The same in Z."),
     Item("model_part.reason", "text", "Why there is no model part; else empty."),
+    Item(
+        "model_part.control",
+        "object?",
+        "What the control points say of σ; null where there are none, in a free network, and in a block in parts.",
+    ),
+    Item(
+        "model_part.control.coordinates", "whole", "Control coordinates looked at, of 12 points at most.", optional=True
+    ),
+    Item(
+        "model_part.control.freedom",
+        "whole",
+        "Contradictions of these coordinates among themselves and with the photographs, beyond what fixes the datum.",
+        optional=True,
+    ),
+    Item(
+        "model_part.control.ratio",
+        "number?",
+        "RMS of the contradictions over what the noise explains; about 1 if σ is right.",
+        optional=True,
+    ),
+    Item("model_part.control.p", "number?", "Probability of a larger ratio.", optional=True),
+    Item("model_part.control.ratio_total", "number?", "The same ratio with the model part.", optional=True),
+    Item("model_part.control.p_total", "number?", "Probability of a larger one.", optional=True),
+    Item(
+        "model_part.control.left_out",
+        "number?",
+        "RMS of the misses of control points, each left out in turn, over their σ.",
+        optional=True,
+    ),
+    Item("model_part.control.left_out_total", "number?", "The same over total σ.", optional=True),
+    Item(
+        "model_part.control.scale",
+        "number?",
+        "What the variances of the model part were multiplied with because of the residuals of control.",
+        optional=True,
+    ),
+    Item(
+        "model_part.control.growth",
+        "number?",
+        "What the variances tied to control points were multiplied with; 1 where the model part explains them.",
+        optional=True,
+    ),
+    Item(
+        "model_part.common[]",
+        "object",
+        "Parts of σ of the object points, RMS over the points: what all have in common, and what is local. Their "
+        "squares add up. Points with σ above three times the median are left out.",
+    ),
+    Item(
+        "model_part.common[].part",
+        "text",
+        "Such as height: shift, height: tilt, height: bend, height: local, plan: turn and scale.",
+    ),
+    Item("model_part.common[].sigma_m", "number", "σ of the noise.", "m"),
+    Item("model_part.common[].total_m", "number", "Total σ.", "m"),
     *gnss_errors(),
     *photograph_fields(),
     *ray_correlation(),

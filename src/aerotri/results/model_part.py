@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
-GROUPS, FIELD = "groups", "field"
-"""Where the model part is from: the differences of many groups, or random fields of few."""
+GROUPS, FIELD, OF_CONTROL = "groups", "field", "control"
+"""Where the model part is from: the differences of many groups, random fields of few, or contradictions of control."""
+CONTROL = "control point"
+"""The scheme where no groups of photographs err, but control points contradict one another and the photographs."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,46 @@ class ModelRoot:
 
 
 @dataclass(frozen=True)
+class ControlEvidence:
+    """What the residuals of control points say of σ and of the model part.
+
+    Parameters
+    ----------
+    coordinates : of control points looked at. freedom : of the contradictions among them and with the photographs.
+    ratio : RMS of the contradictions over what the noise explains, about 1 if σ is right. p : probability of a larger
+        one. ratio_total, p_total : the same with the model part.
+    left_out : RMS of the misses of control points, each left out in turn, over their σ. left_out_total : over total σ.
+    scale : what the variances of the model part were multiplied with because of control.
+    growth : what the variances were multiplied with that are tied to control points, 1 where nothing contradicts them.
+    """
+
+    coordinates: int
+    freedom: int = 0
+    ratio: float = float("nan")
+    p: float = float("nan")
+    ratio_total: float = float("nan")
+    p_total: float = float("nan")
+    left_out: float = float("nan")
+    left_out_total: float = float("nan")
+    scale: float = 1.0
+    growth: float = 1.0
+
+
+@dataclass(frozen=True)
+class CommonPart:
+    """A part of σ of the object points: what all have in common, or what is local.
+
+    Parameters
+    ----------
+    part : such as 'height: tilt'. sigma_m, total_m : RMS over the points of the σ of the noise, and in total.
+    """
+
+    part: str
+    sigma_m: float
+    total_m: float
+
+
+@dataclass(frozen=True)
 class ModelPart:
     """What the model part of σ was derived from.
 
@@ -72,6 +114,7 @@ class ModelPart:
     tests : of all schemes.
     ratio_plan, ratio_height : median of σ total over σ of the object points, 1 where there is no model part.
     reason : why there is no model part, '' otherwise.
+    control : what control points say; None where there are none. common : the parts of σ of the points.
     """
 
     scheme: str = ""
@@ -82,6 +125,8 @@ class ModelPart:
     ratio_plan: float = 1.0
     ratio_height: float = 1.0
     reason: str = ""
+    control: ControlEvidence | None = None
+    common: tuple[CommonPart, ...] = ()
 
     @property
     def counts(self) -> bool:
@@ -95,8 +140,8 @@ class ModelPart:
             return ""
         if self.clusters == 1:
             return "with the position in the image"
-        with_direction = self.scheme == "direction of flight"
-        return "with the direction of flight" if with_direction else f"from {self.scheme} to {self.scheme}"
+        with_direction = self.scheme.startswith("direction of ")
+        return f"with the {self.scheme}" if with_direction else f"from {self.scheme} to {self.scheme}"
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON; None for what is not known."""
@@ -105,5 +150,11 @@ class ModelPart:
             return None if isinstance(value, float) and not np.isfinite(value) else value
 
         own = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        own["tests"] = [{key: plain(value) for key, value in dataclasses.asdict(t).items()} for t in self.tests]
+
+        def plain_keys(record: Any) -> dict[str, Any]:
+            return {key: plain(value) for key, value in dataclasses.asdict(record).items()}
+
+        own["tests"] = [plain_keys(test) for test in self.tests]
+        own["common"] = [plain_keys(part) for part in self.common]
+        own["control"] = None if self.control is None else plain_keys(self.control)
         return {key: plain(value) for key, value in own.items()}

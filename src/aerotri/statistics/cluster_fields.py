@@ -37,8 +37,17 @@ NODES = (7, 5)
 of the format; finer than a sixth it does not bend a block."""
 LENGTHS = (0.2, 0.4, 0.8, 1.6, 3.2)
 """Correlation lengths looked at, in half diagonals of each camera's format."""
+LONGEST_SMOOTH = 0.8
+"""The longest of them for exp(−ρ²/2ℓ²) [C]: longer ones are nearly polynomials of second order, which orientation and
+lens take up. Their size would be an extrapolation from the little that the residuals keep of them."""
+FORMS = tuple(
+    (smooth, length) for smooth in (False, True) for length in LENGTHS if length <= LONGEST_SMOOTH or not smooth
+)
+"""Forms and correlation lengths looked at."""
 SIZES = np.geomspace(1e-2, 1e2, 161)
 """σ_s looked at, in σ of an image coordinate."""
+NOISE = np.geomspace(1.0, 10.0, 16)
+"""Noise of the scores looked at, in σ0."""
 SEEN = 1e-4
 """Eigenvalue of K over the largest below which the unknowns take up a pattern nearly whole; chosen [C]: what the
 residuals show of it is magnified more than a hundredfold."""
@@ -345,8 +354,9 @@ def fit_field(
     values, vectors = np.linalg.eigh(normals)
     shown, seen = (_patterns(values, vectors, scores / sigma0, share) for share in (SAME, SEEN))
     sizes = (unit * SIZES) ** 2
-    best, of_seen = (_most_likely(patterns, camera, cameras, sizes, sigma0) for patterns in (shown, seen))
-    under = _gains(seen, best.correlations[camera], np.array([best.variance]), sigma0)[0][0]
+    best, of_seen = (_most_likely(patterns, seen, camera, cameras, sizes, sigma0) for patterns in (shown, seen))
+    along = _along_field(seen, best.correlations[camera], sigma0)
+    under = _gains(*along, np.array([best.variance]))[0]
     if under < AGREEING * of_seen.gain:
         shown, best = seen, of_seen
     return Field(
@@ -383,28 +393,51 @@ def _patterns(values: np.ndarray, vectors: np.ndarray, scores: np.ndarray, share
 
 
 def _most_likely(
-    shown: _Patterns, camera: np.ndarray, cameras: Sequence[Camera], sizes: np.ndarray, sigma0: float
+    shown: _Patterns, seen: _Patterns, camera: np.ndarray, cameras: Sequence[Camera], sizes: np.ndarray, sigma0: float
 ) -> _Fit:
-    """The form and size with the greatest likelihood."""
+    """The form and size with the greatest likelihood of those that the patterns seen well allow."""
     best = None
-    for smooth in (False, True):
-        for length in LENGTHS:
-            r = correlations(cameras, length, smooth)
-            gains, ratio = _gains(shown, r[camera], sizes, sigma0)
-            k = int(np.argmax(gains))
-            if best is None or gains[k] > best.gain:
-                best = _Fit(float(gains[k]), float(sizes[k]), length, smooth, ratio, r)
+    for smooth, length in FORMS:
+        r = correlations(cameras, length, smooth)
+        power, squares = _along_field(shown, r[camera], sigma0)
+        largest = allowed(*_along_field(seen, r[camera], sigma0))
+        gains = _gains(power, squares, sizes[sizes <= max(largest, sizes[0])])
+        k, ratio = int(np.argmax(gains)), float(np.sqrt(np.sum(power * squares) / np.sum(power)))
+        if best is None or gains[k] > best.gain:
+            best = _Fit(float(gains[k]), float(sizes[k]), length, smooth, ratio, r)
     assert best is not None
     return best
 
 
-def _gains(shown: _Patterns, r: np.ndarray, sizes: np.ndarray, sigma0: float) -> tuple[np.ndarray, float]:
-    """Twice the logarithm of the likelihood over that of white noise by size (mm²); ratio of scores along the field."""
+def _along_field(shown: _Patterns, r: np.ndarray, sigma0: float) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues λ of K^½·R·K^½/σ0² (1/mm²), and the squares of the scores along their patterns, whitened."""
     power, patterns = np.linalg.eigh(spread_of_fields(shown.root, r) / sigma0**2)
-    power, squares = np.maximum(power, 0.0), (patterns.T @ shown.scores) ** 2
-    grown = sizes[:, None] * power
-    gains = np.sum(squares * grown / (1.0 + grown) - np.log1p(grown), axis=1)
-    return gains, float(np.sqrt(np.sum(power * squares) / np.sum(power)))
+    return np.maximum(power, 0.0), (patterns.T @ shown.scores) ** 2
+
+
+def allowed(power: np.ndarray, squares: np.ndarray) -> float:
+    """The largest σ_s² that the residuals allow, mm².
+
+    [D] Of a field the squares of the scores have the expectation n·τ² + σ_s²·Σλ. A likelihood may ask for more where
+    the patterns that the unknowns take up nearly whole call for it: these have little of Σλ.
+
+    Parameters
+    ----------
+    power : (n,) λ. squares : (n,).
+    """
+    return max(float(np.sum(squares)), float(len(squares))) / max(float(np.sum(power)), 1e-300)
+
+
+def _gains(power: np.ndarray, squares: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Twice the logarithm of the likelihood over that of noise alone by size (mm²), the noise τ of the scores unknown.
+
+    Errors that single photographs or neighbouring rays share enlarge the scores of all patterns alike [L: Kish 1965,
+    the design effect]. They are noise here, τ ≥ 1 times σ0.
+    """
+    noise = NOISE[:, None] ** 2
+    alone = -np.sum(squares / noise + np.log(noise), axis=1)
+    variance = noise[:, :, None] + sizes[None, :, None] * power
+    return np.max(-np.sum(squares / variance + np.log(variance), axis=2), axis=0) - np.max(alone)
 
 
 def _without_common(normals: np.ndarray, scores: np.ndarray, camera: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

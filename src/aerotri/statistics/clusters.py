@@ -13,6 +13,7 @@ from aerotri.adjustment.track import (
     order_of_exposure,
     strips_of_track,
 )
+from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block
 
 FEWEST = 5
@@ -33,7 +34,13 @@ CAMERA = "camera"
 OF_ONE_EXPOSURE = ("time", "station")
 """Columns of images.csv that have a value of their own for every exposure and make no groups."""
 SAME_WAY = np.radians(30.0)
-"""Strips whose directions differ by less were flown the same way."""
+"""Strips whose directions differ by less were flown the same way; photographs look the same way."""
+FEWEST_OF_STRIP, LEAST_IN_STRIPS, STRAIGHT = 3, 0.5, 0.25
+"""Strips are looked for where the track turns. There are none [C] where less than half of the exposures lie in straight
+pieces of three exposures or more, not wider than a quarter of their length. Such blocks, of a facade or around an
+object, are divided by the direction in which the photographs look."""
+VIEW = "direction of view"
+"""The scheme of photographs that look the same way, in a block without strips."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +49,7 @@ class Clusters:
 
     Parameters
     ----------
-    scheme : 'strip', 'direction of flight', a column of images.csv, CAMERA or PHOTOGRAPH.
+    scheme : 'strip', 'direction of flight', VIEW, a column of images.csv, CAMERA or PHOTOGRAPH.
     label : (n,) number of every photograph's cluster, photographs as in `Unknowns`. names : (m,) of the clusters.
     joined : how many groups of the scheme there are where neighbours were joined to fewer clusters; len(names) if not.
     """
@@ -57,7 +64,7 @@ class Clusters:
 
 
 def cluster_schemes(block: Block, rows: np.ndarray, centre: np.ndarray) -> tuple[Clusters, ...]:
-    """Strips, directions of flight, every grouping column of images.csv, cameras and single photographs.
+    """Strips, directions of flight or of view, every grouping column of images.csv, cameras and single photographs.
 
     A scheme of one cluster is left out unless the block is one strip, and one that divides the photographs as another
     before it.
@@ -68,14 +75,7 @@ def cluster_schemes(block: Block, rows: np.ndarray, centre: np.ndarray) -> tuple
     centre : (n, 3) m, adjusted.
     """
     images = block.images
-    # the heads of a rig fly one track, not one a head
-    alone, exposure = one_an_exposure(block, rows)
-    order = _order_of_exposure(block, rows[alone], centre[alone])
-    strip, strip_names = _strips(images.strip[rows[alone]].astype(str), centre[alone], order)
-    found = [_limited("strip", strip[exposure], strip_names)]
-    way, way_names = np.empty_like(strip), ()
-    way[order], way_names = _directions(centre[alone][order], strip[order])
-    found.append(_limited("direction of flight", way[exposure], way_names))
+    found = _of_flight(block, rows, centre) or _of_views(block, rows)
     for name, values in images.columns.items():
         if name in OF_ONE_EXPOSURE:
             continue
@@ -91,6 +91,50 @@ def cluster_schemes(block: Block, rows: np.ndarray, centre: np.ndarray) -> tuple
         if several and not any(_alike(clusters, other) for other in kept):
             kept.append(clusters)
     return (*kept, _at_random(centre))
+
+
+def _of_flight(block: Block, rows: np.ndarray, centre: np.ndarray) -> list[Clusters]:
+    """Strips and directions of flight; none where the block was not flown in strips."""
+    # the heads of a rig fly one track, not one a head
+    alone, exposure = one_an_exposure(block, rows)
+    order = _order_of_exposure(block, rows[alone], centre[alone])
+    named = block.images.strip[rows[alone]].astype(str)
+    strip, strip_names = _strips(named, centre[alone], order)
+    if not all(named.tolist()) and not _is_flown(strip, centre[alone]):
+        return []
+    way = np.empty_like(strip)
+    way[order], way_names = _directions(centre[alone][order], strip[order])
+    return [
+        _limited("strip", strip[exposure], strip_names),
+        _limited("direction of flight", way[exposure], way_names),
+    ]
+
+
+def _is_flown(strip: np.ndarray, centre: np.ndarray) -> bool:
+    """Whether enough exposures, strips (e,) and centres (e, 3), lie in straight pieces of the track."""
+    inside = 0
+    for number in np.unique(strip):
+        xy = centre[strip == number, :2]
+        if len(xy) >= FEWEST_OF_STRIP:
+            length, width = np.linalg.svd(xy - xy.mean(axis=0), compute_uv=False)
+            inside += len(xy) if width <= STRAIGHT * length else 0
+    return inside >= LEAST_IN_STRIPS * len(strip)
+
+
+def _of_views(block: Block, rows: np.ndarray) -> list[Clusters]:
+    """Photographs that look the same way together, by the orientations of the block where it has them."""
+    angles = block.images.angles[rows]
+    if not np.isfinite(angles).all():
+        return []
+    axis = rotation_from_angles(angles, block.rotation)[:, :, 2]
+    label, found = np.zeros(len(axis), dtype=np.int64), []
+    for k, own in enumerate(axis):
+        near = [float(own @ other) for other in found]
+        if not near or max(near) < np.cos(SAME_WAY):
+            found.append(own)
+            near.append(1.0)
+        label[k] = int(np.argmax(near))
+    return [_limited(VIEW, label, tuple(str(k + 1) for k in range(len(found))))]
 
 
 def order_by_place(xyz: np.ndarray) -> np.ndarray:
@@ -114,13 +158,13 @@ def to_test(clusters: Clusters, centre: np.ndarray) -> Clusters:
     ----------
     centre : (n, 3) m, of the photographs.
     """
-    return _at_random(centre, MOST_TESTED) if clusters.scheme == PHOTOGRAPH else clusters
+    return _at_random(centre, MOST_TESTED, 1) if clusters.scheme == PHOTOGRAPH else clusters
 
 
-def _at_random(centre: np.ndarray, most: int = MOST_AT_RANDOM) -> Clusters:
-    """Photographs at random into clusters of PER_CLUSTER at least, so many at most."""
+def _at_random(centre: np.ndarray, most: int = MOST_AT_RANDOM, per_cluster: int = PER_CLUSTER) -> Clusters:
+    """Photographs at random into clusters of `per_cluster` at least, so many at most."""
     n = len(centre)
-    most = max(min(most if n <= LARGE else MOST_OF_LARGE, n // PER_CLUSTER), 1)
+    most = max(min(most if n <= LARGE else MOST_OF_LARGE, n // per_cluster), 1)
     equal = np.empty(n, dtype=np.int64)
     equal[order_by_place(centre)] = np.arange(n) % most
     label = divided_at_random(centre, equal, np.random.default_rng(n))

@@ -59,6 +59,23 @@ class Excess:
     points: np.ndarray
     root: ModelRoot
 
+    def scaled(self, scale: float) -> Excess:
+        """With all variances multiplied by `scale`."""
+        size, root = np.sqrt(scale), self.root
+        columns = ModelRoot(
+            size * root.images, size * root.shared, (size * root.points).astype(np.float32), scale * root.noise
+        )
+        return Excess(scale * self.images, scale * self.shared, scale * self.points, columns)
+
+    def beside(self, other: Excess) -> Excess:
+        """The sum of two model parts, the other without noise in it."""
+        columns = (
+            np.concatenate([getattr(one.root, of) for one in (self, other)], axis=-1)
+            for of in ("images", "shared", "points")
+        )
+        sums = (getattr(self, of) + getattr(other, of) for of in ("images", "shared", "points"))
+        return Excess(*sums, ModelRoot(*columns, self.root.noise))
+
 
 def why_not(model_part: str, photographs: int, status: str, sigma0: float) -> str:
     """Why a block has no model part from clusters, '' where it can have one.
