@@ -29,7 +29,7 @@ from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.quantiles import chi_square_exceedance, normal_quantile, student_quantile
 from aerotri.results.model_part import ControlEvidence, ModelRoot
-from aerotri.statistics.cluster_test import spread
+from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, spread
 from aerotri.statistics.model_of_functions import known_root_of
 from aerotri.statistics.model_part import COVERED, positive_part
 
@@ -75,12 +75,20 @@ def control_equations(system: NormalSystem, solution: Solution, factor: Factor) 
     chosen = observed[spread(solution.state.points[observed, :2])]
     row, axes = np.nonzero(u.prior_weight[chosen] > 0.0)
     rows, size = chosen[row], len(row)
-    weight, sides = np.sqrt(u.prior_weight[rows, axes]), np.zeros((len(u.points), 3, len(row)))
-    sides[rows, axes, np.arange(size)] = weight
-    _, shared, points = solve_sides(system, solution.state, factor, sides, solution.estimator, rows=observed)
-    cofactors, known = weight[:, None] * points[rows, axes], known_root_of(system, shared, points)
+    weight, cofactors, known = np.sqrt(u.prior_weight[rows, axes]), np.zeros((size, size)), []
+    at_once = int(np.clip(NUMBERS_AT_ONCE / (3 * len(u.points)), 1, size))
+    for first in range(0, size, at_once):
+        own = np.arange(first, min(first + at_once, size))
+        sides = np.zeros((len(u.points), 3, len(own)))
+        sides[rows[own], axes[own], np.arange(len(own))] = weight[own]
+        _, shared, points = solve_sides(system, solution.state, factor, sides, solution.estimator, rows=observed)
+        cofactors[:, own] = weight[:, None] * points[rows, axes]
+        known.append(known_root_of(system, shared, points))
+    of_known = np.concatenate(known, axis=1)
     residual = weight * (u.prior_xyz - solution.state.points)[rows, axes]
-    return ControlEquations(rows, axes, weight, residual, 0.5 * (cofactors + cofactors.T), known.T @ known)
+    return ControlEquations(
+        rows, axes, weight, residual, 0.5 * (cofactors + cofactors.T), of_known.T @ of_known
+    )  # fmt: skip
 
 
 def model_of_control(equations: ControlEquations, root: ModelRoot | None, widening: float, sigma0: float) -> np.ndarray:
