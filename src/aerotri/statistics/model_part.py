@@ -69,12 +69,14 @@ class Excess:
 
     def beside(self, other: Excess) -> Excess:
         """The sum of two model parts, the other without noise in it."""
-        columns = (
-            np.concatenate([getattr(one.root, of) for one in (self, other)], axis=-1)
-            for of in ("images", "shared", "points")
+        one, two = self.root, other.root
+        columns = ModelRoot(
+            np.concatenate([one.images, two.images], axis=2),
+            np.concatenate([one.shared, two.shared], axis=1),
+            np.concatenate([one.points, two.points], axis=2),
+            one.noise,
         )
-        sums = (getattr(self, of) + getattr(other, of) for of in ("images", "shared", "points"))
-        return Excess(*sums, ModelRoot(*columns, self.root.noise))
+        return Excess(self.images + other.images, self.shared + other.shared, self.points + other.points, columns)
 
 
 def why_not(model_part: str, photographs: int, status: str, sigma0: float) -> str:
