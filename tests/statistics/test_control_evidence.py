@@ -8,7 +8,6 @@ import pytest
 import aerotri
 from aerotri.diagnosis.moving_errors import control_in_words
 from aerotri.pipeline.chain import adjust_keeping_system
-from aerotri.results.model_part import OF_CONTROL
 from aerotri.statistics.control_evidence import (
     along_model,
     control_equations,
@@ -63,7 +62,7 @@ def test_what_is_tied_to_control_is_all_of_it_at_the_control_points(found):
 def test_control_worse_than_stated_is_found_and_total_sigma_contains_it():
     """Six points with errors five times their σ: contradictions, a sentence, and larger total σ."""
     layout = {"positions": [[x, y] for x in (0.1, 0.5, 0.9) for y in (0.2, 0.8)], "check_points": 0}
-    block = small_block(4, control={**layout, "sigma_m": [0.1, 0.1, 0.1]})[0]
+    block, truth = small_block(4, control={**layout, "sigma_m": [0.1, 0.1, 0.1]})
     wrong = replace(block, control=replace(block.control, sigma=block.control.sigma / 5.0))
     right, result = (aerotri.adjust(one, explain=False).adjusted for one in (block, wrong))
     assert right.model_part.control.p > 1e-3
@@ -71,17 +70,22 @@ def test_control_worse_than_stated_is_found_and_total_sigma_contains_it():
     part = result.model_part
     assert part.control.p < 1e-6
     assert part.control.left_out > 2.0
-    assert part.method == OF_CONTROL
-    assert part.control.growth > 5.0
-    assert "left out in turn" in control_in_words(part.control).lower()
-    assert any("control points contradict one another" in text for text in result.outcome.warnings)
-    points = result.points
-    assert np.nanmedian(points.total_sigma[:, 2] / points.sigma[:, 2]) > 1.5
+    # control that bends the block shows as errors of the photographs too: in total the misses are as large as expected
+    assert 0.6 < part.control.left_out_total < 1.5
+    said = control_in_words(part.control)
+    assert "left out in turn" in said.lower()
+    assert said in result.outcome.warnings
+    error = (result.points.xyz - truth.points)[:, 2]
+    alone, total = (
+        np.sqrt(np.nanmean((error / s[:, 2]) ** 2)) for s in (result.points.sigma, result.points.total_sigma)
+    )
+    assert alone > 1.5
+    assert 0.3 < total < 1.5
 
 
 def test_without_control_nothing_is_scaled():
     assert scale_of_model(np.zeros(4), np.ones(4), 7.0) == pytest.approx(1.0)
-    assert scale_of_model(np.full(4, 100.0), np.full(4, 0.5), 7.0) < 0.5
+    assert scale_of_model(np.full(4, 100.0), np.full(4, 0.5), 7.0) < 0.6
     assert scale_of_model(np.full(4, 1.0), np.full(4, 30.0), 7.0) > 2.0
 
 
