@@ -17,7 +17,7 @@ from aerotri.observations import Block
 from aerotri.pipeline.local import undamped_factor
 from aerotri.pipeline.model_part import with_model_part
 from aerotri.pipeline.relative import with_relative
-from aerotri.pipeline.verdict import judged, with_purpose
+from aerotri.pipeline.verdict import judged, with_evidence, with_purpose
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.in_crs import transform_result
 from aerotri.statistics.common_motion import common_motion
@@ -76,7 +76,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
         result = replace(result, outcome=replace(result.outcome, verdict=saved.verdict, reasons=saved.reasons))
     delivered = result if frame is None else transform_result(result, block, frame)
     found = with_relative(with_model_part(Adjustment(delivered, result, system, solution, frame)))
-    return with_purpose(found) if saved.verdict else judged(found)
+    return with_purpose(with_evidence(found)) if saved.verdict else judged(found)
 
 
 def _refuse_other_parameters(system: NormalSystem, saved: SavedSolution) -> None:

@@ -9,23 +9,39 @@ from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates.blocks import frame_of_block
 from aerotri.diagnosis import diagnose, judge
 from aerotri.diagnosis.check_points import in_doubt
+from aerotri.diagnosis.control_heights import stand_out
 from aerotri.diagnosis.purpose import purpose
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock, Outcome
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.check_freedom import check_freedom
+from aerotri.statistics.control_heights import control_heights
 
 
 def judged(found: Adjustment) -> Adjustment:
     """The adjustment with the verdict over it."""
-    if found.local.block.settings.adjustment.datum == "control" and in_doubt(found.local):
-        factor = found.system.factorise(found.solution.equations)
-        freedom = check_freedom(found.system, found.solution, factor, found.local)
-        local = replace(found.local, check=replace(found.local.check, freedom=freedom))
-        found = replace(found, local=local, result=local if found.frame is None else found.result)
+    found = with_evidence(found)
     verdict = judge(found.local)
     outcome = replace(found.result.outcome, verdict=verdict.level, reasons=verdict.reasons)
     return with_purpose(with_outcome(found, outcome))
+
+
+def with_evidence(found: Adjustment) -> Adjustment:
+    """The adjustment with what takes time to compute and is asked for only where the numbers leave a doubt."""
+    local, system, solution = found.local, found.system, found.solution
+    if local.block.settings.adjustment.datum != "control" or solution.status != "converged":
+        return found
+    of_check, of_control = in_doubt(local), stand_out(local)
+    if not of_check and not of_control:
+        return found
+    factor = system.factorise(solution.equations)
+    if of_check:
+        freedom = check_freedom(system, solution, factor, local)
+        local = replace(local, check=replace(local.check, freedom=freedom))
+    if of_control:
+        heights = control_heights(system, solution, factor, local.outcome.sigma0)
+        local = replace(local, control_heights=heights)
+    return replace(found, local=local, result=local if found.frame is None else found.result)
 
 
 def with_purpose(found: Adjustment) -> Adjustment:

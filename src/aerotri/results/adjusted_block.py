@@ -16,6 +16,7 @@ from aerotri.results.head import Head, now
 if TYPE_CHECKING:
     from aerotri.results.common_motion import CommonMotion
     from aerotri.results.common_shift import CommonShift
+    from aerotri.results.control_heights import ControlHeights
     from aerotri.results.deviations import Deviations
     from aerotri.results.model_part import ModelPart
     from aerotri.results.photograph_fields import PhotographFields
@@ -343,7 +344,7 @@ class AdjustedBlock:
     `ray_correlation` how much neighbouring rays of a photograph err alike, `common_shift` what all observed positions
     are shifted against the control points, `common_motion` what they are turned and scaled,
     `photograph_fields` how much photographs have smooth errors of their own, `relative` the σ of the shape of the
-    block.
+    block, `control_heights` how the heights of all control points together fit; None where none of them stands out.
     """
 
     block: Block
@@ -372,6 +373,7 @@ class AdjustedBlock:
     photograph_fields: PhotographFields | None = None
     relative: RelativePrecision | None = None
     common_motion: CommonMotion | None = None
+    control_heights: ControlHeights | None = None
 
 
 def head_of(adjusted: AdjustedBlock) -> Head:
