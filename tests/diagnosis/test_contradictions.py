@@ -10,6 +10,8 @@ from aerotri.diagnosis import findings
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.results.common_motion import CHANCE
+from aerotri.results.control_heights import BOWL, NAMES, SPLIT
+from aerotri.statistics.control_heights import control_heights
 from dense_algebra import TINY
 from small_blocks import small_block, with_adjustment
 
@@ -92,3 +94,74 @@ def test_what_control_alone_cannot_show():
     assert len(notes) == 1
     assert "height of the pole" in notes[0].says
     assert notes[0].grade == "accepted"
+
+
+SMALL = TINY | {"control": {"distance_bases": 2.0, "sigma_m": [0.03, 0.03, 0.05], "check_points": 8}}
+"""With heights enough for two groups."""
+
+
+def with_heights(seed, change):
+    """A block held by control alone, heights of its control changed by `change(xyz from the middle, names)` m."""
+    block, _ = small_block(seed, **SMALL)
+    control = block.control
+    own, xyz = ~control.is_check, control.xyz.copy()
+    off = xyz[own] - xyz[own].mean(axis=0)
+    xyz[own, 2] += change(off)
+    return replace(block, control=replace(control, xyz=xyz))
+
+
+def every_second(off):
+    return 0.8 * (np.arange(len(off)) % 2 == 0)
+
+
+def bent(off):
+    distance = np.linalg.norm(off[:, :2], axis=1)
+    return 2.0 * (distance / distance.max()) ** 2
+
+
+def nothing(off):
+    return 0.0 * off[:, 0]
+
+
+@pytest.mark.parametrize(("change", "words"), [(every_second, "fall into two groups"), (bent, "like a bowl")])
+def test_heights_of_control_that_contradict_the_photographs(change, words):
+    """Though a block held by control alone follows them."""
+    result = aerotri.adjust(with_heights(2, change))
+    assert result.verdict != "accepted"
+    assert any(words in reason for reason in result.reasons)
+
+
+def heights_of(block):
+    found = adjust_keeping_system(block)
+    factor = found.system.factorise(found.solution.equations)
+    return control_heights(found.system, found.solution, factor, found.local.outcome.sigma0)
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "size"), [(every_second, SPLIT, 0.8), (bent, BOWL, 2.0), (None, NAMES, 0.8)]
+)
+def test_size_of_a_pattern(change, kind, size):
+    """Within its σ; by names where half of the points have another beginning."""
+    block = with_heights(2, change or every_second)
+    if change is None:
+        block = renamed(block)
+    pattern = next(one for one in heights_of(block).patterns if one.kind == kind)
+    assert abs(abs(pattern.size) - size) < 4.0 * pattern.sigma
+    assert pattern.sigma < 0.3 * size
+    assert pattern.p < CHANCE
+
+
+def renamed(block):
+    """Every second control point with another beginning of its name."""
+    points, own = block.points.astype(object), block.control.point[~block.control.is_check]
+    points[own[::2]] = [f"high_{k}" for k in range(len(own[::2]))]
+    return replace(block, points=points.astype(str))
+
+
+def test_heights_of_faultless_blocks():
+    """Their probabilities are spread evenly between 0 and 1."""
+    found = [heights_of(with_heights(seed, nothing)) for seed in range(1, 7)]
+    p = np.array([one.p for one in found])
+    assert 0.1 < np.median(p) < 0.9
+    assert p.min() > CHANCE
+    assert all(pattern.p > CHANCE for one in found for pattern in one.patterns)
