@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import aerotri
+from aerotri.adjustment import doubtful_starts
 from aerotri.diagnosis import diagnose
 from aerotri.functional_model.rotation import (
     angles_from_rotation,
@@ -22,7 +23,7 @@ from aerotri.results.adjusted_block import Outcome
 from aerotri.results.failure import AdjustmentFailedError
 from aerotri.simulation import parse_spec, simulate
 from rig_blocks import rig_block
-from small_blocks import small_block
+from small_blocks import small_block, small_spec
 from wrong_blocks import DRONE, SPEC, clean, image_points, negated, photograph
 
 ROUGH = {"start_values": {"kind": "perturbed", "position_sigma_m": 2.0, "angle_sigma_deg": 3.0}}
@@ -82,6 +83,19 @@ def test_start_of_one_photograph_is_replaced_whatever_the_angle_and_the_axis(sha
         assert degrees_apart(block, started.block).max() < 15.0, (degrees, axis, number, started.messages)
         assert len(started.messages) == 1
         assert f"start angles of photograph {photograph(block, number)} were not used" in started.messages[0]
+
+
+def test_photographs_far_from_one_another_are_taken_out_at_once(monkeypatch):
+    """Turned by so little that pairs still agree: rounds do not grow with the number of photographs that are wrong."""
+    flight = small_spec()["flight"] | {"strips": 1, "images_per_strip": 40, "end_lap": 0.8, "cross_strips": []}
+    block = small_block(1, flight=flight, tie_points=small_spec()["tie_points"] | {"per_image": 20})[0]
+    wrong = np.arange(5, 40, 10)
+    local = turned(block, wrong, np.array([1.0, 0.0, 0.0]), 7.0)
+    rounds, miss = [], doubtful_starts.miss_by_photograph
+    monkeypatch.setattr(doubtful_starts, "miss_by_photograph", lambda *given: rounds.append(1) or miss(*given))
+    found = doubtful_starts.doubtful(local, doubtful_starts.given_orientations(local))
+    assert np.flatnonzero(found).tolist() == wrong.tolist()
+    assert len(rounds) <= 3 < len(wrong)
 
 
 TURNS = {

@@ -305,12 +305,32 @@ def _unit_rays(tangent: np.ndarray, rotation: np.ndarray) -> np.ndarray:
 def _without_misses(
     local: Block, directions: Directions, at: Orientations, good: np.ndarray, limit: float
 ) -> np.ndarray:
-    """The set without photographs that miss what the others of it say, the worst taken out one after the other."""
+    """The set without photographs that miss what the others of it say, the worst of every neighbourhood first.
+
+    What is taken out changes the misses of those that share points with it, and of no others.
+    """
     good = good.copy()
     for _ in range(int(good.sum())):
         missed = np.nan_to_num(miss_by_photograph(local, directions, at.only(good)))
-        worst = int(np.argmax(missed))
-        if missed[worst] <= limit:
+        worst = _worst_around(local.image_points, missed, missed > limit)
+        if not worst.any():
             break
-        good[worst] = False
+        good &= ~worst
     return good
+
+
+def _worst_around(rays: ImagePoints, missed: np.ndarray, among: np.ndarray) -> np.ndarray:
+    """(n,) bool, photographs that miss by more than all others with a point in common.
+
+    Parameters
+    ----------
+    missed : (n,) rad. among : (n,) bool, the photographs looked at; all others miss by less.
+    """
+    worst, rank = among.copy(), np.zeros(len(among), dtype=np.int64)
+    rank[np.argsort(-missed, kind="stable")] = np.arange(len(among), 0, -1)
+    rows = np.flatnonzero(among[rays.image])
+    image, (_, point) = rays.image[rows], np.unique(rays.point[rows], return_inverse=True)
+    highest = np.zeros(len(rows), dtype=np.int64)
+    np.maximum.at(highest, point, rank[image])
+    worst[image[rank[image] < highest[point]]] = False
+    return worst
