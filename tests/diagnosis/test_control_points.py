@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.spatial
 
 import aerotri
 from aerotri.diagnosis.control_points import doubts_of_control
@@ -108,6 +109,14 @@ def test_two_points_at_one_pixel(ten):
     (said,) = doubts_of_control(replace(ten, image_points=added))
     assert f"are marked at one place of {ten.images.names[rays.image[first]]} (0 px apart)" in said
     assert str(ten.points[other]) in said
+
+
+def test_marks_of_all_photographs_are_searched_at_once(ten, monkeypatch):
+    """One search for two marks at one place, whatever the number of photographs."""
+    searches, tree = [], scipy.spatial.KDTree
+    monkeypatch.setattr("scipy.spatial.KDTree", lambda places: searches.append(len(places)) or tree(places))
+    assert doubts_of_control(ten) == ()
+    assert searches == [int(np.isin(ten.image_points.point, ten.control.point).sum())]
 
 
 def test_one_point_typed_twice(ten):

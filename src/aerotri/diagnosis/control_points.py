@@ -48,27 +48,29 @@ def _at_one_pixel(block: Block, off: np.ndarray) -> list[str]:
     pixel = np.array([camera.pixel_mm for camera in block.cameras])[block.images.camera[rays.image[marks]]]
     place = rays.xy[marks] / pixel[:, None]
     said: dict[tuple[int, int], str] = {}
-    for image in np.unique(rays.image[marks]).tolist():
-        own = np.flatnonzero(rays.image[marks] == image)
-        for a, b in _near(place[own]):
-            one, other = (int(row[rays.point[marks[own[k]]]]) for k in (a, b))
-            away = float(np.linalg.norm(np.nan_to_num(control.xyz[one] - control.xyz[other])))
-            if one == other or away <= SAME_PLAN_M:
-                continue
-            apart = float(np.linalg.norm(place[own[a]] - place[own[b]]))
-            names = listed(block.points[control.point[[one, other]]])
-            said[one, other] = (
-                f"control points {names} are marked at one place of {block.images.names[image]} ({apart:.2g} px "
-                f"apart), but lie {away:.3g} m apart: one of the two marks belongs to another point"
-            )
+    for a, b in _near(place, rays.image[marks]):
+        one, other = (int(row[rays.point[marks[k]]]) for k in (a, b))
+        away = float(np.linalg.norm(np.nan_to_num(control.xyz[one] - control.xyz[other])))
+        if one == other or away <= SAME_PLAN_M:
+            continue
+        apart = float(np.linalg.norm(place[a] - place[b]))
+        names, image = listed(block.points[control.point[[one, other]]]), block.images.names[rays.image[marks[a]]]
+        said[one, other] = (
+            f"control points {names} are marked at one place of {image} ({apart:.2g} px "
+            f"apart), but lie {away:.3g} m apart: one of the two marks belongs to another point"
+        )
     return list(said.values())[:MOST_SHOWN]
 
 
-def _near(place: np.ndarray) -> list[tuple[int, int]]:
-    """Pairs of places (k, 2) px within `SAME_PIXEL`."""
+def _near(place: np.ndarray, image: np.ndarray) -> list[tuple[int, int]]:
+    """Pairs of places (k, 2) px within `SAME_PIXEL` in one photograph, by photograph; `image` (k,) of each."""
     from scipy.spatial import KDTree
 
-    return sorted(KDTree(place).query_pairs(SAME_PIXEL)) if len(place) > 1 else []
+    if len(place) < 2:
+        return []
+    # photographs as layers, farther apart than places may be: one search for all of them
+    found = KDTree(np.column_stack([place, 2.0 * SAME_PIXEL * image])).query_pairs(SAME_PIXEL)
+    return sorted(found, key=lambda pair: (image[pair[0]], pair))
 
 
 def _typed_twice(block: Block) -> list[str]:
