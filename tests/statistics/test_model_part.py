@@ -149,6 +149,15 @@ def test_sum_of_squares_is_that_of_dense_algebra(small):
     assert value == pytest.approx(np.sum((vectors[:, there].T @ u) ** 2 / values[there]), rel=1e-3)
 
 
+def test_positive_part_of_what_is_not_known():
+    """One covariance that is not known leaves the others as they are."""
+    whole = np.stack([np.diag([4.0, 1.0, 9.0]), np.full((3, 3), np.nan), np.diag([1.0, 2.0, 3.0])])
+    found = positive_part(whole, np.broadcast_to(2.0 * np.eye(3), whole.shape))
+    assert found[0] == pytest.approx(np.diag([2.0, 0.0, 7.0]))
+    assert found[2] == pytest.approx(np.diag([0.0, 0.0, 1.0]))
+    assert np.isnan(found[1]).all()
+
+
 def test_positive_part():
     rng = np.random.default_rng(1)
     root = rng.normal(size=(4, 3, 3))

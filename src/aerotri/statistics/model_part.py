@@ -220,8 +220,8 @@ def excess_of_root(system: NormalSystem, solution: Settled, root: ModelRoot, poi
 def positive_part(covariance: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """Covariances less what noise explains of them, (k, d, d) both, without negative eigenvalues.
 
-    Each is scaled to its own diagonal first, or to a share of both where little of the diagonal is left: scaled to
-    nothing, the other variances would grow without bound.
+    NaN where one is not known. Each is scaled to its own diagonal first, or to a share of both where little of the
+    diagonal is left: scaled to nothing, the other variances would grow without bound.
     """
     rest = covariance - noise
     left, both = (
@@ -229,8 +229,10 @@ def positive_part(covariance: np.ndarray, noise: np.ndarray) -> np.ndarray:
     )  # fmt: skip
     scale = np.sqrt(np.maximum(left, LEAST_LEFT * both))
     scale = np.where(scale > 0.0, scale, 1.0)
-    values, vectors = np.linalg.eigh(rest / (scale[:, :, None] * scale[:, None, :]))
-    kept = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+    known = np.isfinite(rest).all(axis=(1, 2))
+    values, vectors = np.linalg.eigh((rest / (scale[:, :, None] * scale[:, None, :]))[known])
+    kept = np.full_like(rest, np.nan)
+    kept[known] = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
     return kept * scale[:, :, None] * scale[:, None, :]
 
 
