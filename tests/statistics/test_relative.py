@@ -8,10 +8,12 @@ import pytest
 
 from aerotri.adjustment.datum import motions_of_images, motions_of_points
 from aerotri.pipeline.chain import adjust_keeping_system
+from aerotri.pipeline.relative import with_relative
 from aerotri.results.model_part import ModelRoot
 from aerotri.statistics.relative import local_cofactors, neighbouring_pairs, relative_covariances, shape_of
 from aerotri.statistics.similarity import fit_similarity
 from dense_algebra import TINY, dense_design
+from rig_blocks import rig_block
 from small_blocks import small_block, with_adjustment
 
 GNSS = {"sigma_m": [2.0, 2.0, 4.0]}
@@ -110,7 +112,7 @@ def test_neighbours_are_functions_of_the_whole_covariance():
     u, near, sigma0 = found.system.unknowns, found.local.relative.neighbours, found.local.outcome.sigma0
     factor = found.system.factorise(found.solution.equations)
     shape = shape_of(found.system, found.solution, factor, local_cofactors(found)[0])
-    first, second = neighbouring_pairs(found.solution.state, shape.rows)
+    first, second = neighbouring_pairs(u, found.solution.state, shape.rows)
     assert near.pairs == len(first) > 20
     of_heights = 6 * len(u.images) + len(u.shared) + 2
     left = dense_left(found)[0][of_heights::3, of_heights::3]
@@ -145,3 +147,55 @@ def test_errors_after_a_similarity_are_as_large_as_they_should_be(changes):
         squares.append(np.mean((moved.residual / found.relative.points[points]) ** 2, axis=0))
     # ninety points of a block have some dozen modes in common: their mean square is known to a seventh from ten blocks
     assert np.sqrt(np.mean(squares, axis=0)) == pytest.approx(np.ones(3), abs=0.2)
+
+
+def with_unknown_points(found, rows):
+    """As `with_relative` gets it, with covariances of some points (P,) that are not known."""
+    covariance = found.local.points.covariance.copy()
+    covariance[found.system.unknowns.points[rows]] = np.nan
+    local = replace(found.local, points=replace(found.local.points, covariance=covariance), relative=None)
+    return replace(found, local=local, result=local)
+
+
+def test_a_point_without_cofactors_takes_nothing_from_the_others():
+    found = adjusted(**WITHOUT_CONTROL)
+    u, before = found.system.unknowns, found.local.relative
+    factor = found.system.factorise(found.solution.equations)
+    lost = shape_of(found.system, found.solution, factor, local_cofactors(found)[0]).rows[0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        after = with_relative(with_unknown_points(found, [lost])).local.relative
+    assert np.isnan(after.points[u.points[lost]]).all()
+    others = np.delete(u.points, lost)
+    # the datum has one point less
+    assert after.points[others] == pytest.approx(before.points[others], rel=0.1)
+    assert after.scale == pytest.approx(before.scale, rel=0.05)
+    assert with_relative(with_unknown_points(found, np.arange(len(u.points)))).local.relative is None
+
+
+@pytest.mark.parametrize("movement", [None, 0.01], ids=["rigid", "weighted"])
+def test_a_base_is_between_stations_and_not_between_cameras_of_a_rig(movement):
+    """Cameras of a rig 5 cm apart: neighbours lie half of the way between stations apart, as without the rig."""
+    block = rig_block(3, cameras=("left",))[0]
+    if movement is not None:
+        cameras = {
+            name: replace(one, movement_m=movement, movement_rad=1e-4) for name, one in block.rigs[0].cameras.items()
+        }
+        block = replace(block, rigs=(replace(block.rigs[0], constraint="weighted", cameras=cameras),))
+    found = adjust_keeping_system(block)
+    assert (found.system.unknowns.rigging is None) == (movement is not None)
+    near = found.local.relative.neighbours
+    centre = found.local.images.centre[block.images.camera == 0, :2]
+    apart = np.linalg.norm(centre[:, None] - centre, axis=2) + np.diag(np.full(len(centre), np.inf))
+    assert near.distance == pytest.approx(0.5 * np.median(apart.min(axis=1)), rel=0.5)
+    assert near.pairs > 10
+
+
+def test_photographs_taken_twice_at_a_place_make_no_base():
+    found = adjusted()
+    u, state = found.system.unknowns, found.solution.state
+    rows = np.arange(len(u.points))
+    twice = replace(state, centre=np.concatenate([state.centre, state.centre + [0.3, 0.0, 0.0]]))
+    once = neighbouring_pairs(u, state, rows)
+    assert len(once[0]) > 20
+    assert np.array_equal(neighbouring_pairs(u, twice, rows), once)

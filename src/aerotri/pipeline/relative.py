@@ -18,7 +18,8 @@ FEWEST_POINTS = 4
 
 
 def with_relative(found: Adjustment) -> Adjustment:
-    """The adjustment with σ after a similarity of the whole block; as it is where there is no final σ0."""
+    """The adjustment with σ after a similarity of the whole block; as it is where there is no final σ0, or no
+    σ of any point."""
     begun = time.perf_counter()
     system, solution, sigma0 = found.system, found.solution, found.local.outcome.sigma0
     u = system.unknowns
@@ -28,6 +29,8 @@ def with_relative(found: Adjustment) -> Adjustment:
         return found
     factor = system.factorise(solution.equations)
     covariances = relative_covariances(system, solution, factor, sigma0, local_cofactors(found), found.model)
+    if covariances is None:
+        return found
     relative = _in_frame(found.local, found.frame, covariances, u.points, u.images)
     local = _told(found.local, _in_frame(found.local, None, covariances, u.points, u.images), begun)
     result = local if found.frame is None else _told(found.result, relative, begun)

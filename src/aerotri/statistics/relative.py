@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
+from aerotri import of_known
 from aerotri.adjustment.datum import motions_of_images, motions_of_points, rig_motions
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.point_sides import solve_sides
@@ -46,6 +47,9 @@ LOOSE = 5.0
 chosen [C]."""
 BASES = 0.5
 """Distance of neighbouring points in bases [C]: within one stereo model, about the size of what is measured in it."""
+ONE_PLACE = 0.02
+"""Distance of positions over that of the ground, below which they count as one [C]: a photograph on the same place, or
+another camera of a rig, makes no base. Of neighbours at 97 % end lap it is more."""
 MOST_PAIRS = 30
 """Pairs of neighbours whose σ is computed, a right side each; chosen [C]: their median is sure to a tenth."""
 NEAR = 2.0
@@ -93,8 +97,8 @@ class RelativeCovariances:
 def relative_covariances(
     system: NormalSystem, solution: Solution, factor: Factor, sigma0: float,
     q: tuple[np.ndarray, np.ndarray], root: ModelRoot | None = None,
-) -> RelativeCovariances:  # fmt: skip
-    """The covariances of a block after a similarity of the whole.
+) -> RelativeCovariances | None:  # fmt: skip
+    """The covariances of a block after a similarity of the whole; None where no point is known that could tell it.
 
     Parameters
     ----------
@@ -102,6 +106,8 @@ def relative_covariances(
     q : cofactors of points (P, 3, 3) and projection centres (n, 3, 3) in the datum of the block.
     """
     shape = shape_of(system, solution, factor, q[0])
+    if shape is None:
+        return None
     d = shape.datum
     noise = _left(q[0], d.points, d.q_points, d.both), _left(q[1], d.images[:, :3], d.q_images[:, :3], d.both)
     points, centres, similarity = (sigma0**2 * part for part in (*noise, d.both))
@@ -120,20 +126,25 @@ def local_cofactors(found: Adjustment) -> tuple[np.ndarray, np.ndarray]:
     return points / variance, images / variance
 
 
-def shape_of(system: NormalSystem, solution: Solution, factor: Factor, q_points: np.ndarray) -> Shape:
-    """The similarity over the points that are as well determined as most.
+def shape_of(system: NormalSystem, solution: Solution, factor: Factor, q_points: np.ndarray) -> Shape | None:
+    """The similarity over the points that are as well determined as most; None where no cofactors are known.
 
     Parameters
     ----------
-    q_points : (P, 3, 3) in the datum of the block.
+    q_points : (P, 3, 3) in the datum of the block, NaN where they are not known.
     """
     state, u = solution.state, system.unknowns
     inner = inner_datum(system, state, factor, solution.estimator) if is_inner(system) else None
     rows = _spread_rows(u, state.points)
+    rows = rows[np.isfinite(q_points[rows]).all(axis=(1, 2))]
+    if not len(rows):
+        return None
     shape = _shape_over(system, solution, factor, rows, inner)
     d = shape.datum
     left = np.trace(_left(q_points, d.points, d.q_points, d.both), axis1=1, axis2=2)
-    good = rows[left[rows] <= LOOSE**2 * np.median(left[rows])]
+    good = rows[left[rows] <= LOOSE**2 * of_known.median(left[rows])]
+    if not len(good):
+        return None
     return shape if len(good) == len(rows) else _shape_over(system, solution, factor, good, inner)
 
 
@@ -143,8 +154,8 @@ def _spread_rows(unknowns: Unknowns, points: np.ndarray) -> np.ndarray:
     enough = rays >= ENOUGH_RAYS
     if enough.sum() < max(FEWEST, SHARE * len(rays)):
         enough = rays >= 1
-    far = np.linalg.norm(points - np.median(points[enough], axis=0), axis=1)
-    return np.flatnonzero(enough & (far <= LOOSE * np.median(far[enough])))
+    far = np.linalg.norm(points - of_known.medians(points[enough]), axis=1)
+    return np.flatnonzero(enough & (far <= LOOSE * of_known.median(far[enough])))
 
 
 def _shape_over(
@@ -246,7 +257,7 @@ def neighbours(
 ) -> Neighbours | None:
     """σ of differences of height between points half a base apart, median of some pairs; None without such pairs."""
     state = solution.state
-    first, second = neighbouring_pairs(state, shape.rows)
+    first, second = neighbouring_pairs(system.unknowns, state, shape.rows)
     if not len(first):
         return None
     at_once = int(np.clip(NUMBERS_AT_ONCE / (3 * len(state.points)), 1, len(first)))
@@ -261,9 +272,9 @@ def neighbours(
     return Neighbours(float(np.median(apart)), len(first), absolute, float(np.median(sigma[1])))
 
 
-def neighbouring_pairs(state: State, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def neighbouring_pairs(unknowns: Unknowns, state: State, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rows of points about half a base apart in plan, spread over the block."""
-    centres = state.centre[:, :2]
+    centres = _places_of_stations(unknowns, state)
     if len(centres) < 2 or len(rows) < 2:
         return rows[:0], rows[:0]
     wanted = BASES * float(np.median(KDTree(centres).query(centres, k=2)[0][:, 1]))
@@ -280,6 +291,22 @@ def neighbouring_pairs(state: State, rows: np.ndarray) -> tuple[np.ndarray, np.n
             partner[k] = others[np.argmin(np.abs(apart - wanted))]
     there = partner >= 0
     return rows[some[there]], rows[partner[there]]
+
+
+def _places_of_stations(unknowns: Unknowns, state: State) -> np.ndarray:
+    """(k, 2) m, the places photographed from: of a rig one, and one where several photographs were taken at a place."""
+    u, leads = unknowns, np.ones(len(state.centre), dtype=bool)
+    if u.rigging is not None:
+        leads[u.rigging.followers] = False
+    if u.ties is not None:
+        leads[u.ties.image] = False
+    ways = np.linalg.norm(state.points - state.centre[u.rays.image[u.rays.start[:-1]]], axis=1)
+    places = state.centre[leads, :2]
+    near = KDTree(places).query_pairs(ONE_PLACE * of_known.median(ways), output_type="ndarray")
+    kept = np.ones(len(places), dtype=bool)
+    for one, other in near[np.argsort(near[:, 0], kind="stable")].tolist():
+        kept[other] &= not kept[one]
+    return places[kept]
 
 
 def _of_pairs(
