@@ -14,15 +14,17 @@ from aerotri.conventions import FilePath, InputError
 if TYPE_CHECKING:
     from pyproj import CRS
 
+LOCAL = "Engineering CRS"
+"""What PROJ calls local coordinates."""
 LONGEST = 40
 """Characters of a text that is shown as it is: a code such as ESRI:102013, no definition."""
 
 
 def crs_text(crs: CRS | None) -> str:
-    """The text of a system; '' of None."""
-    if crs is None:
+    """The text of a system; '' of None, and of local coordinates under a name of their own (LOCAL_CS, ENGCRS)."""
+    if crs is None or crs.type_name == LOCAL:
         return ""
-    codes = [part.to_epsg() for part in _parts(crs)]
+    codes = [_code(part) for part in _parts(crs)]
     return crs.to_wkt() if None in codes else "EPSG:" + "+".join(map(str, codes))
 
 
@@ -45,7 +47,7 @@ def same_system(one: str, other: str) -> bool:
     if one.upper() == other.upper():
         return True
     first, second = _system(one), _system(other)
-    return first is not None and second is not None and first.equals(second, ignore_axis_order=True)
+    return first is not None and second is not None and _are_alike(first, second)
 
 
 def system_in_words(text: str) -> str:
@@ -93,6 +95,49 @@ def is_known_system(text: str) -> bool:
 
 def _has_codes(text: str) -> bool:
     return text[:5].upper() == "EPSG:" or not text
+
+
+def _code(crs: CRS) -> int | None:
+    """The EPSG code of a system: the one that it states, else what PROJ finds, else what GDAL takes it for.
+
+    PROJ finds a code by the exact definition only; files have axes in another order, and other programs' names.
+    """
+    from rasterio.crs import CRS as GdalCrs
+    from rasterio.errors import CRSError
+
+    stated = crs.to_json_dict().get("id", {})
+    if stated.get("authority") == "EPSG":
+        return int(stated["code"])
+    code = crs.to_epsg()
+    if code is not None:
+        return code
+    try:
+        return GdalCrs.from_wkt(crs.to_wkt()).to_epsg()
+    except CRSError:
+        return None
+
+
+def _are_alike(first: CRS, second: CRS) -> bool:
+    """Whether two definitions put the same numbers at the same places, whatever their names and the order of axes."""
+    if first.equals(second, ignore_axis_order=True):
+        return True
+    if not (first.is_projected and second.is_projected) or first.is_compound or second.is_compound:
+        return False
+    one, other = first.geodetic_crs, second.geodetic_crs
+    if one is None or other is None or not one.equals(other, ignore_axis_order=True):
+        return False
+    return _projection(first) == _projection(second)
+
+
+def _projection(crs: CRS) -> tuple[str, list[tuple[str, float]], list[str]]:
+    operation = crs.coordinate_operation
+    values = (
+        []
+        if operation is None
+        else [(p.name.lower(), float(p.value) * p.unit_conversion_factor) for p in operation.params]
+    )
+    method = "" if operation is None else operation.method_name
+    return method, sorted((name, round(value, 9)) for name, value in values), sorted(a.unit_name for a in crs.axis_info)
 
 
 def _text_of_part(text: str, number: int) -> str:

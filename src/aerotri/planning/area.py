@@ -12,6 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aerotri.conventions import InputError
+from aerotri.crs_text import system_in_words
 from aerotri.vectors.crs import LON_LAT, stated_crs
 from aerotri.vectors.geojson import GeoJsonFeature, crs_of_name, read_geojson
 from aerotri.vectors.geopackage import read_geopackage
@@ -169,7 +170,9 @@ def _refuse_degrees(crs: str) -> str:
     try:
         found = CRS.from_user_input(crs)
     except CRSError:
-        raise InputError(f"PROJ does not know {crs}", "give EPSG:n") from None
+        raise InputError(f"PROJ does not know {system_in_words(crs)}", "give EPSG:n") from None
     if not found.is_projected or any(axis.unit_name not in ("metre", "meter") for axis in found.axis_info[:2]):
-        raise InputError(f"{crs} does not count in metres", "give a projected CRS in metres, such as UTM")
+        raise InputError(
+            f"{system_in_words(crs)} does not count in metres", "give a projected CRS in metres, such as UTM"
+        )
     return f"EPSG:{found.to_epsg()}" if found.to_epsg() else crs

@@ -71,8 +71,9 @@ def ground_of_dem(path: Path, area: Area, reach: float) -> Ground:
     left, bottom, right, top = area.polygon.buffer(reach).bounds
     with MetricReader(path, target=area.crs) as reader:
         if area.crs is not None and reader.plan and not same_system(reader.plan, area.crs):
-            own = system_in_words(reader.plan)
-            raise InputError(f"is in {own}, the plan in {area.crs}", f"give --crs {own}", path)
+            message = f"is in {system_in_words(reader.plan)}, the plan in {system_in_words(area.crs)}"
+            has_code = reader.plan.upper().startswith("EPSG:")
+            raise InputError(message, f"give --crs {reader.plan}" if has_code else "bring the DEM into that CRS", path)
         step = max(reader.grid.cell_x, max(right - left, top - bottom) / MOST_NODES)
         x, y = np.arange(left, right + step, step), np.arange(bottom, top + step, step)
         shape = len(y), len(x)

@@ -335,7 +335,7 @@ def _write(target: Path, found: MeasuredChange, plots: bool) -> None:
              "difference over σ": c.significance}  # fmt: skip
     with atomic_folder(target, own=OWN_NAMES) as folder:
         # differences are no heights: their raster has the system of the plan alone
-        write_bands(folder / RASTER, bands, c.grid, found.summary["crs"].partition("+")[0] or None)
+        write_bands(folder / RASTER, bands, c.grid, plan_of(found.summary["crs"]) or None)
         write_rows(found.volumes, folder / TABLE)
         if plots:
             from aerotri.report.documents.picture_texts import save_translated

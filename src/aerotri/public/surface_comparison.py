@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
-from aerotri.crs_text import height_system, heights_of, refuse_other_system, same_system
+from aerotri.crs_text import height_system, heights_of, plan_of, refuse_other_system, same_system
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.change_epochs import silent_in_words
 from aerotri.public.folders import refuse_foreign_folder
@@ -316,9 +316,7 @@ def _sources(test: SurfaceLike, control: SurfaceLike, stack: ExitStack) -> tuple
 
     both = (test, control)
     files = [_file(one) for one in both]
-    held = [
-        (as_surface(one).crs or "").partition("+")[0] for one, path in zip(both, files, strict=True) if path is None
-    ]
+    held = [plan_of(as_surface(one).crs or "") for one, path in zip(both, files, strict=True) if path is None]
     crs = next(filter(None, held), None) or common_crs(*(path for path in files if path is not None))
     found = [
         heights_of_raster(stack.enter_context(as_surface(one).reader())) if path is None

@@ -6,6 +6,7 @@ NaN inside the program and the no-data value in a file.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -146,7 +147,8 @@ class RasterReader:
         import rasterio
 
         self.path, self.band = Path(path), band
-        regular_file(self.path)
+        if os.path.lexists(self.path) and not self.path.is_dir():  # GDAL opens folders, and files inside archives
+            regular_file(self.path)
         with _told(self.path, "is no raster", "give a GeoTIFF"), quietly():
             self._file = rasterio.open(self.path)
         try:
@@ -321,7 +323,7 @@ def write_raster(path: FilePath, values: np.ndarray, grid: Grid, crs: Any = None
 
 def horizontal_crs(crs: str) -> str | None:
     """The CRS of a raster of a block: 'EPSG:25832' of 'EPSG:25832+7837', None for 'local'."""
-    return None if crs == "local" else crs.partition("+")[0]
+    return None if crs == "local" else plan_of(crs)
 
 
 def crs_of_heights(crs: str) -> str | None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
+from aerotri.crs_text import height_system
+
 if TYPE_CHECKING:
     from pyproj import CRS
 
@@ -34,6 +36,8 @@ def metric_height_system(code: str) -> str:
 def height_system_in_words(code: str) -> str:
     """'EPSG:5703 (NAVD88 height)'."""
     known = _vertical(code)
+    if not code.isdigit():
+        return "a system of heights without an EPSG code" + ("" if known is None else f" ('{known.name}')")
     return f"EPSG:{code}" if known is None else f"EPSG:{code} ({known.name})"
 
 
@@ -42,7 +46,7 @@ def _vertical(code: str) -> CRS | None:
     from pyproj.exceptions import CRSError
 
     try:
-        found = CRS.from_user_input(f"EPSG:{code}")
+        found = CRS.from_user_input(height_system(code))
     except CRSError:
         return None
     return found if found.is_vertical else None

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
-from aerotri.crs_text import heights_of, with_heights
+from aerotri.crs_text import heights_of, plan_of, with_heights
 from aerotri.rasters.grids import NO_DATA, Grid, RasterReader
 from aerotri.rasters.height_systems import metric_height_system
 
@@ -112,7 +112,11 @@ class MetricReader(RasterReader):
         """As of `RasterReader`; heights stay on their datum where they, or the plan, were brought to metres."""
         stated = super().system
         heights = heights_of(stated) or self._heights
-        return with_heights(stated, metric_height_system(heights)) if stated and heights else stated
+        if not stated or not heights:
+            return stated
+        metric = metric_height_system(heights)
+        # heights that were in feet of a system without a code are in metres of one that has no name
+        return with_heights(stated, metric) if metric.isdigit() or self._factor == METRE else plan_of(stated)
 
     def _bring_to_metres(self, target: str | None) -> None:
         units = units_of(self)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -140,7 +141,8 @@ def bounds_of(path: Path) -> tuple[float, float, float, float]:
     import rasterio
     from rasterio.errors import RasterioError
 
-    regular_file(path)
+    if os.path.lexists(path):
+        regular_file(path)
     try:
         with quietly(), rasterio.open(path) as file:
             t, bounds = file.transform, file.bounds

@@ -127,8 +127,8 @@ def _enter_system(database: sqlite3.Connection, crs: str | None) -> int:
 
 def _code(crs: str, own: CRS) -> int | None:
     """The EPSG code of a system; None for a plan and heights that have none together."""
-    alone = crs.partition(":")[2]
-    return int(alone) if alone.isdecimal() else own.to_epsg()
+    authority, _, alone = crs.partition(":")
+    return int(alone) if authority.upper() == "EPSG" and alone.isdecimal() else own.to_epsg()
 
 
 def _enter_layer(database: sqlite3.Connection, layer: Layer, srs: int) -> None:

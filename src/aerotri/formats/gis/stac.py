@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import InputError, real_path
+from aerotri.crs_text import plan_of
 from aerotri.deformation.footprints import Footprints
 from aerotri.formats.results.json_text import number_or_none
 from aerotri.results.adjusted_block import AdjustedBlock
@@ -96,7 +97,7 @@ def in_degrees(outline: Any, crs: str) -> Any:
             "the block has local coordinates, STAC needs longitude and latitude",
             'write crs = "EPSG:n" in block.toml where the coordinates are of a known system, and adjust it again',
         )
-    transformer = Transformer.from_crs(crs.partition("+")[0], "EPSG:4326", always_xy=True)
+    transformer = Transformer.from_crs(plan_of(crs), "EPSG:4326", always_xy=True)
     turned = shapely.transform(outline, lambda xy: np.column_stack(transformer.transform(xy[:, 0], xy[:, 1])))
     west, _, east, _ = turned.bounds
     parts = [turned]
@@ -158,7 +159,7 @@ def _projection(crs: str, bounds: Sequence[float]) -> dict[str, Any]:
     from pyproj import CRS
 
     own = CRS.from_user_input(crs)
-    code = own.to_epsg() if "+" in crs else int(crs.partition(":")[2])
+    code = own.to_epsg()
     named: dict[str, Any] = {"proj:code": f"EPSG:{code}"} if code else {"proj:code": None, "proj:wkt2": own.to_wkt()}
     return named | {"proj:bbox": [float(value) for value in bounds]}
 
