@@ -207,12 +207,11 @@ def _fitted(
         values = state.shared[field.columns]
         effective -= float(np.sum(cofactor[np.ix_(at, at)] * field.weight))
         omega -= float(values @ field.weight @ values)
-    without = (
-        count_observations(system).redundancy
-        + len(own)
-        - sum(f.rank for f in (*system.priors.fields, *system.priors.deviation_priors))
-    )
-    deviance = without * float(np.log(omega / without)) if without > 0 and omega > 0.0 else float("nan")
+    redundancy = count_observations(system).redundancy
+    without = redundancy + len(own) - sum(f.rank for f in (*system.priors.fields, *system.priors.deviation_priors))
+    # a set that leaves no redundancy fits whatever was measured: its residuals are rounding
+    judged = redundancy > 0 and without > 0 and omega > 0.0
+    deviance = without * float(np.log(omega / without)) if judged else float("nan")
     bic = deviance + effective * float(np.log(max(without, 1)))
     if system.priors.fields and np.isfinite(bic):
         fixed = len(own) - sum(len(field.weight) for field in system.priors.fields) + HYPERPARAMETERS
