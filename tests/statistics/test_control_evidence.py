@@ -12,7 +12,6 @@ from aerotri.statistics.control_evidence import (
     along_model,
     control_equations,
     left_out_over_sigma,
-    root_of_control,
     scale_of_model,
 )
 from small_blocks import small_block
@@ -47,40 +46,19 @@ def test_points_left_out_are_those_of_adjustments_without_them(found):
     assert adjustment.result.model_part.control.left_out == pytest.approx(expected)
 
 
-def test_what_is_tied_to_control_is_all_of_it_at_the_control_points(found):
-    """F·Fᵀ with a growth of 2 is σ0²·Q of the control points, and at no other point above σ0²·Q."""
-    adjustment, factor, equations = found
-    sigma0 = adjustment.local.outcome.sigma0
-    root, squares = root_of_control(adjustment.system, adjustment.solution, factor, equations, 2.0, sigma0)
-    covariance = adjustment.local.points.covariance[adjustment.system.unknowns.points]
-    rows = np.unique(equations.rows)
-    assert squares[rows] == pytest.approx(covariance[rows], rel=1e-4, abs=1e-9)
-    assert np.linalg.eigvalsh(covariance - squares).min() > -1e-6 * covariance.max()
-    assert root.noise == 0.0
-
-
-def test_control_worse_than_stated_is_found_and_total_sigma_contains_it():
-    """Six points with errors five times their σ: contradictions, a sentence, and larger total σ."""
+def test_control_worse_than_stated_is_told():
+    """Six points with errors five times their σ: contradictions, and a sentence."""
     layout = {"positions": [[x, y] for x in (0.1, 0.5, 0.9) for y in (0.2, 0.8)], "check_points": 0}
-    block, truth = small_block(4, control={**layout, "sigma_m": [0.1, 0.1, 0.1]})
+    block, _ = small_block(4, control={**layout, "sigma_m": [0.1, 0.1, 0.1]})
     wrong = replace(block, control=replace(block.control, sigma=block.control.sigma / 5.0))
     right, result = (aerotri.adjust(one, explain=False).adjusted for one in (block, wrong))
     assert right.model_part.control.p > 1e-3
-    assert right.model_part.control.growth == 1.0
-    part = result.model_part
-    assert part.control.p < 1e-6
-    assert part.control.left_out > 2.0
-    # control that bends the block shows as errors of the photographs too: in total the misses are as large as expected
-    assert 0.6 < part.control.left_out_total < 1.5
-    said = control_in_words(part.control)
+    control = result.model_part.control
+    assert control.p < 1e-6
+    assert control.left_out > 2.0
+    said = control_in_words(control)
     assert "left out in turn" in said.lower()
     assert said in result.outcome.warnings
-    error = (result.points.xyz - truth.points)[:, 2]
-    alone, total = (
-        np.sqrt(np.nanmean((error / s[:, 2]) ** 2)) for s in (result.points.sigma, result.points.total_sigma)
-    )
-    assert 0.3 < total < 1.5
-    assert total < 0.9 * alone
 
 
 def test_without_control_nothing_is_scaled():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aerotri.diagnosis.finding import Finding, times
 from aerotri.results.adjusted_block import AdjustedBlock
-from aerotri.results.model_part import FIELD, OF_CONTROL, ControlEvidence, ModelPart
+from aerotri.results.model_part import FIELD, ControlEvidence, ModelPart
 
 WORTH_SAYING = 1.1
 """σ total over σ from which the model part is told [C]: below, it changes no decision."""
@@ -24,12 +24,6 @@ def model_part_in_words(part: ModelPart) -> str:
     if not part.counts or max(part.ratio_plan, part.ratio_height) < WORTH_SAYING:
         return ""
     plan, height = (f"{ratio:.1f} times" for ratio in (part.ratio_plan, part.ratio_height))
-    if part.method == OF_CONTROL and part.control is not None:
-        return (
-            f"the control points contradict one another and the photographs {part.control.ratio:.1f} times as much as "
-            f"noise explains: from the noise alone heights would look {height} and positions {plan} too sure. The "
-            "total σ (tX, tY, tZ) contain this"
-        )
     return (
         f"the errors of the photographs change {part.change}, more than noise explains: from the "
         f"noise alone heights would look {height} and positions {plan} too sure. The total σ (tX, tY, tZ) contain "

@@ -13,9 +13,9 @@ from aerotri.diagnosis.moving_errors import control_in_words, model_part_in_word
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.in_crs import with_model_of
-from aerotri.results.model_part import CONTROL, FIELD, GROUPS, OF_CONTROL, ModelPart
+from aerotri.results.model_part import FIELD, GROUPS, ControlEvidence, ModelPart
 from aerotri.statistics.cluster_fields import fitted_field, root_of_field
-from aerotri.statistics.cluster_test import ATTRIBUTED, LEVEL
+from aerotri.statistics.cluster_test import LEVEL
 from aerotri.statistics.clusters import cluster_schemes
 from aerotri.statistics.common_modes import common_parts
 from aerotri.statistics.control_evidence import (
@@ -24,9 +24,7 @@ from aerotri.statistics.control_evidence import (
     along_model,
     control_equations,
     evidence,
-    growth_by_control,
     model_of_control,
-    root_of_control,
     scale_of_model,
 )
 from aerotri.statistics.covariance import cofactors, inner_datum
@@ -81,7 +79,7 @@ def with_model_part(found: Adjustment) -> Adjustment:
     stage = _Stage(found, factor, None if settings.is_free else control_equations(system, solution, factor))
     part, excess = _of_clusters(stage)
     stage = stage if excess is None else stage.again()
-    part, excess = _with_control(stage, part, excess)
+    part = replace(part, control=_control_says(stage, part, excess))
     covariance = found.local.points.covariance[u.points]
     if not settings.is_free:
         model = None if excess is None else (excess.root, excess.points)
@@ -120,27 +118,17 @@ def _of_clusters(stage: _Stage) -> tuple[ModelPart, Excess | None]:
     return part, excess_of_clusters(system, solution, factor, clusters, sigma0, q, inner)
 
 
-def _with_control(stage: _Stage, part: ModelPart, excess: Excess | None) -> tuple[ModelPart, Excess | None]:
-    """The model part as large as control points show it, and what they show beside it."""
+def _control_says(stage: _Stage, part: ModelPart, excess: Excess | None) -> ControlEvidence | None:
+    """What control points say of σ and of the model part; neither is changed by it, as in an adjustment in parts."""
     if stage.control is None:
-        return part, excess
-    system, solution, factor = stage.equations
+        return None
     of_groups = part.method == GROUPS
     widening, scale = of_few(part.clusters) if of_groups else 1.0, 1.0
     of_model = model_of_control(stage.control, None if excess is None else excess.root, widening, stage.sigma0)
     power, squares = along_model(stage.control, of_model, stage.sigma0)
     if excess is not None and len(squares):
         scale = scale_of_model(power, squares, part.clusters - 1 if of_groups else FREEDOM_OF_FIELDS)
-        excess = excess.scaled(scale)
-    says = evidence(stage.control, scale * widening * of_model, stage.sigma0)
-    if says.p_total < (LEVEL if excess is None else ATTRIBUTED):
-        says = replace(says, growth=growth_by_control(says))
-        own = root_of_control(system, solution, factor, stage.control, says.growth, stage.sigma0)
-        beside = excess_of_root(system, solution, *own)
-        if excess is None:
-            part = replace(part, scheme=CONTROL, clusters=says.coordinates, method=OF_CONTROL, reason="")
-        excess = beside if excess is None else excess.beside(beside)
-    return replace(part, control=replace(says, scale=scale)), excess
+    return replace(evidence(stage.control, widening * of_model, stage.sigma0), scale=scale)
 
 
 def _with(found: Adjustment, local: AdjustedBlock, begun: float) -> Adjustment:

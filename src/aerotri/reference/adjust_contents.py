@@ -220,13 +220,7 @@ ADJUSTMENT = (
     Item(
         "model_part.control.scale",
         "number?",
-        "What the variances of the model part were multiplied with because of the residuals of control.",
-        optional=True,
-    ),
-    Item(
-        "model_part.control.growth",
-        "number?",
-        "What the variances tied to control points were multiplied with; 1 where the model part explains them.",
+        "What the residuals of control say the variances of the model part should be multiplied with; it is not done.",
         optional=True,
     ),
     Item(

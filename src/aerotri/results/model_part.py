@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
-GROUPS, FIELD, OF_CONTROL = "groups", "field", "control"
-"""Where the model part is from: the differences of many groups, random fields of few, or contradictions of control."""
-CONTROL = "control point"
-"""The scheme where no groups of photographs err, but control points contradict one another and the photographs."""
+GROUPS, FIELD = "groups", "field"
+"""Where the model part is from: the differences of many groups, or random fields of few."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +70,7 @@ class ControlEvidence:
     ratio : RMS of the contradictions over what the noise explains, about 1 if σ is right. p : probability of a larger
         one. ratio_total, p_total : the same with the model part.
     left_out : RMS of the misses of control points, each left out in turn, over their σ. left_out_total : over total σ.
-    scale : what the variances of the model part were multiplied with because of control.
-    growth : what the variances were multiplied with that are tied to control points, 1 where nothing contradicts them.
+    scale : what control points say the variances of the model part should be multiplied with, 1 without a model part.
     """
 
     coordinates: int
@@ -85,7 +82,6 @@ class ControlEvidence:
     left_out: float = float("nan")
     left_out_total: float = float("nan")
     scale: float = 1.0
-    growth: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,10 @@ Bayesian Data Analysis, ch. 3]
 
     p(γ | r) ~ p(γ)·|R + γ·M_w|^(−½)·exp(−½·rᵀ(R + γ·M_w)⁺r),   M_w = W·M·W/σ0².
 
-The model part is scaled so that ± 1.96 total σ hold the truth in 95 % of the cases, which is what it was scaled to
-without control. Control that agrees makes it smaller, also because its size is better known; control that contradicts
-makes it larger.
+Scaled by the factor of `scale_of_model`, ± 1.96 total σ hold the truth in 95 % of the cases, as without
+control. Control
+that agrees makes the factor smaller, also because the size is better known then; control that contradicts makes
+it larger. The factor is told, and σ is left as it is.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.point_sides import solve_sides
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
-from aerotri.quantiles import chi_square_exceedance, normal_quantile, student_quantile
+from aerotri.quantiles import chi_square_exceedance
 from aerotri.results.model_part import ControlEvidence, ModelRoot
 from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, spread
 from aerotri.statistics.model_of_functions import known_root_of
@@ -180,33 +181,3 @@ def _quantile(share: np.ndarray) -> float:
         below = np.array([0.5 + 0.5 * erf(ratio) for ratio in (middle / roots).tolist()])
         low, high = (middle, high) if np.sum(share * below) < upper * np.sum(share) else (low, middle)
     return 0.5 * (low + high)
-
-
-def growth_by_control(found: ControlEvidence) -> float:
-    """What the variances tied to control points are multiplied with where no model part explains their contradictions.
-
-    [L: Birge 1932] The mean square of the contradictions, widened as the variance of few groups is: with f degrees of
-    freedom errors over the square root follow Student's t.
-    """
-    upper = 0.5 + 0.5 * COVERED
-    return (found.ratio_total * student_quantile(upper, found.freedom) / normal_quantile(upper)) ** 2
-
-
-def root_of_control(
-    system: NormalSystem, solution: Solution, factor: Factor, equations: ControlEquations, growth: float, sigma0: float
-) -> tuple[ModelRoot, np.ndarray]:
-    """Columns F of what is tied to the control points, and F·Fᵀ of the points (P, 3, 3).
-
-    [D] Q_x·W·H⁻½: the part of σ0²·Q that the coordinates of the control points explain. F·Fᵀ is (growth − 1) times it:
-    near the control points all of Q grows, what hangs on single rays does not.
-    """
-    u, size = system.unknowns, len(equations.rows)
-    values, vectors = np.linalg.eigh(equations.cofactors)
-    there = values > DETERMINED * values[-1]
-    mix = vectors[:, there] / np.sqrt(values[there]) * np.sqrt(max(growth - 1.0, 0.0)) * sigma0
-    sides = np.zeros((len(u.points), 3, mix.shape[1]))
-    for k in range(size):
-        sides[equations.rows[k], equations.axes[k]] += equations.weight[k] * mix[k]
-    images, shared, points = solve_sides(system, solution.state, factor, sides, solution.estimator)
-    images = images * u.eo_free[:, :, None]
-    return ModelRoot(images, shared, points.astype(np.float32), 0.0), points @ np.swapaxes(points, 1, 2)

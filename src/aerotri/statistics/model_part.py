@@ -59,25 +59,6 @@ class Excess:
     points: np.ndarray
     root: ModelRoot
 
-    def scaled(self, scale: float) -> Excess:
-        """With all variances multiplied by `scale`."""
-        size, root = np.sqrt(scale), self.root
-        columns = ModelRoot(
-            size * root.images, size * root.shared, (size * root.points).astype(np.float32), scale * root.noise
-        )
-        return Excess(scale * self.images, scale * self.shared, scale * self.points, columns)
-
-    def beside(self, other: Excess) -> Excess:
-        """The sum of two model parts, the other without noise in it."""
-        one, two = self.root, other.root
-        columns = ModelRoot(
-            np.concatenate([one.images, two.images], axis=2),
-            np.concatenate([one.shared, two.shared], axis=1),
-            np.concatenate([one.points, two.points], axis=2),
-            one.noise,
-        )
-        return Excess(self.images + other.images, self.shared + other.shared, self.points + other.points, columns)
-
 
 def why_not(model_part: str, photographs: int, status: str, sigma0: float) -> str:
     """Why a block has no model part from clusters, '' where it can have one.
