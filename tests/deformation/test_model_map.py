@@ -70,7 +70,7 @@ def gpkg_blob(rings, order=1, z=0, envelope=0, several=False):
 
 def test_geojson(tmp_path):
     features = [feature([LEFT_HALF, HOLE], "a", "b"), feature([RIGHT_HALF], "b", "c", "MultiPolygon")]
-    found = read_polygons(write_geojson(tmp_path / "m.geojson", features), 25832)
+    found = read_polygons(write_geojson(tmp_path / "m.geojson", features), "EPSG:25832")
     assert found.names == (("a", "b"), ("b", "c"))
     np.testing.assert_array_equal(found.numbers(GRID, 0, 0, 12, 10), EXPECTED)
     # windows, also beyond the edges
@@ -85,7 +85,7 @@ def test_geopackage(tmp_path, order, z, envelope, several):
         (gpkg_blob([LEFT_HALF, HOLE], order, z, envelope, several), "a", "b"),
         (gpkg_blob([RIGHT_HALF], order, z, envelope, several), "b", "c"),
     ]
-    found = read_polygons(write_gpkg(tmp_path / "m.gpkg", rows), 25832)
+    found = read_polygons(write_gpkg(tmp_path / "m.gpkg", rows), "EPSG:25832")
     assert found.names == (("a", "b"), ("b", "c"))
     np.testing.assert_array_equal(found.numbers(GRID, 0, 0, 12, 10), EXPECTED)
     assert found.note == ""
@@ -111,7 +111,7 @@ def test_geopackage(tmp_path, order, z, envelope, several):
 def test_bad_polygons(tmp_path, content, message):
     (tmp_path / "m.geojson").write_text(content)
     with pytest.raises(InputError, match=message):
-        read_polygons(tmp_path / "m.geojson", 25832)
+        read_polygons(tmp_path / "m.geojson", "EPSG:25832")
 
 
 def test_files_that_are_none(tmp_path):

@@ -31,7 +31,10 @@ for _name in ("AEROTRI_THREADS", "OPENBLAS_NUM_THREADS"):
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
 from odd_blocks import COMMANDS, PARAMETERS, drawn, ends  # noqa: E402
+from runs_elsewhere import Runs, add_executor, runs_of  # noqa: E402
 
+AT_ONCE = 100
+"""Blocks after which what became of them is kept."""
 SLOW_S = 60.0
 """Processor time from which a block is listed."""
 
@@ -48,7 +51,7 @@ class Became:
     seconds: float
 
 
-def became(number: int) -> Became:
+def became(_shared: None, number: int) -> Became:
     """Run one block."""
     odd, begun, codes, exception = drawn(number), time.process_time(), (), ""
     with tempfile.TemporaryDirectory(prefix="aerotri_odd_") as folder:
@@ -105,16 +108,21 @@ def main() -> None:
     if not known:
         kept.unlink(missing_ok=True)
     wanted = [k for k in range(arguments.blocks) if k not in known or (arguments.again and known[k].exception)]
-    for number in wanted:
-        known[number] = became(number)
-        with kept.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(asdict(known[number])) + "\n")
-        if known[number].exception:
-            print(number, known[number].exception, flush=True)
-        if len(known) % 100 == 0:
+    with runs_of(arguments) as runs:
+        for begin in range(0, len(wanted), AT_ONCE):
+            _run(runs, wanted[begin : begin + AT_ONCE], known, kept)
             arguments.out.write_text(markdown(known.values()), encoding="utf-8")
-    arguments.out.write_text(markdown(known.values()), encoding="utf-8")
     raise SystemExit(1 if any(one.exception for one in known.values()) else 0)
+
+
+def _run(runs: Runs, numbers: list[int], known: dict[int, Became], kept: Path) -> None:
+    """Run some blocks, and keep what became of them."""
+    for one in runs(became, None, numbers):
+        known[one.number] = one
+        with kept.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(asdict(one)) + "\n")
+        if one.exception:
+            print(one.number, one.exception, flush=True)
 
 
 def _known(path: Path) -> dict[int, Became]:
@@ -132,6 +140,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--go-on", action="store_true", help="leave out blocks that --out knows already")
     parser.add_argument("--again", action="store_true", help="run blocks that ended in an exception anew as well")
     parser.add_argument("--out", type=Path, default=Path("odd_blocks.md"), help="table to write")
+    add_executor(parser)
     return parser.parse_args()
 
 

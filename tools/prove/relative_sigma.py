@@ -20,6 +20,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 import aerotri
+from runs_elsewhere import Runs, add_executor, runs_of
 
 FLIGHT = {"gsd_m": 0.1, "strips": 2, "images_per_strip": 5, "end_lap": 0.6, "side_lap": 0.3, "heading_deg": 20.0,
           "attitude_sigma_deg": [1.0, 1.0, 2.0], "position_sigma_m": [5.0, 5.0, 3.0]}  # fmt: skip
@@ -55,8 +56,9 @@ def similarity(points: np.ndarray, truth: np.ndarray, used: np.ndarray) -> tuple
     return scale * (points - middle) @ turn.T + aim, scale
 
 
-def of_block(changes: dict[str, Any], parameters: str, seed: int) -> np.ndarray:
+def of_block(case: tuple[dict[str, Any], str], seed: int) -> np.ndarray:
     """Mean squares of errors over relative σ in X, Y, Z, of the scale over its σ, and relative over absolute σ of Z."""
+    changes, parameters = case
     simulated = aerotri.simulate(spec(changes), seed=seed)
     result = aerotri.adjust(simulated.block, parameters=parameters, explain=False, model_part="off")
     table, truth = result.points, simulated.truth.points
@@ -124,12 +126,19 @@ def main() -> None:
     parser.add_argument("--blocks", type=int, default=200)
     parser.add_argument("--brighton", type=Path, help="block that `aerotri tiepoints` made of Brighton's photographs")
     parser.add_argument("--data", type=Path, default=Path("../shared/data/brighton"))
+    add_executor(parser)
     options = parser.parse_args()
+    with runs_of(options) as runs:
+        tables(options, runs)
+
+
+def tables(options: argparse.Namespace, runs: Runs) -> None:
+    """Print the tables of simulated blocks and of Brighton."""
     print(f"# Relative σ (tools/prove/relative_sigma.py)\n\n{options.blocks} simulated blocks of ten photographs each: "
           "RMS of errors after a similarity over their relative σ, with its scatter\n")  # fmt: skip
     print("| held by | X | Y | Z | scale | relative over absolute σ of Z |\n|---|---|---|---|---|---|")
-    for name, (changes, parameters) in CASES.items():
-        found = np.array([of_block(changes, parameters, seed) for seed in range(1, options.blocks + 1)])
+    for name, case in CASES.items():
+        found = np.array(runs(of_block, case, range(1, options.blocks + 1)))
         rms, scatter = np.sqrt(found.mean(axis=0)), found.std(axis=0) / np.sqrt(len(found))
         cells = [f"{r:.3f} ± {s / (2.0 * r):.3f}" for r, s in zip(rms[:4], scatter[:4], strict=True)]
         print(f"| {name} | {' | '.join(cells)} | {np.median(found[:, 4]):.3f} |", flush=True)

@@ -86,7 +86,13 @@ def _layers(database: sqlite3.Connection, path: Path) -> list[tuple[str, str, st
 
 
 def _system(database: sqlite3.Connection, srs: int, path: Path) -> str:
-    """The CRS of a number of the file's own list: by organisation and code, else by its definition."""
+    """The CRS of a number of the file's own list: by organisation and code, else by its definition.
+
+    A file without such a list is no whole GeoPackage; its numbers are taken for EPSG codes.
+    """
+    lists = "SELECT count(*) FROM sqlite_master WHERE name = 'gpkg_spatial_ref_sys'"
+    if not database.execute(lists).fetchone()[0]:
+        return f"EPSG:{srs}"
     query = "SELECT organization, organization_coordsys_id, definition FROM gpkg_spatial_ref_sys WHERE srs_id = ?"
     row = database.execute(query, (srs,)).fetchone()
     if row is None:

@@ -188,7 +188,7 @@ def _surfaces() -> list[Target]:
     def window(path: Path) -> object:
         with RasterReader(path) as reader:
             reader.sample(reader.grid.x([1, 2]), reader.grid.y([1, 2]))
-            return reader.read(0, 0, min(reader.grid.rows, 64), min(reader.grid.columns, 64)), reader.epsg
+            return reader.read(0, 0, min(reader.grid.rows, 64), min(reader.grid.columns, 64)), reader.system
 
     def cloud(path: Path) -> object:
         refuse_cloud_units(path)
@@ -230,14 +230,15 @@ def _vectors() -> list[Target]:
     from aerotri.volume.boundary import read_boundary
 
     wkt = f"SRID=25832;POLYGON (({', '.join(f'{x} {y}' for x, y in seeds.POLYGON[0])}))".encode()
-    boundary = lambda path: read_boundary(str(path), 25832)  # noqa: E731
+    boundary = lambda path: read_boundary(str(path), "EPSG:25832")  # noqa: E731
+    models = lambda path: read_polygons(path, "EPSG:25832")  # noqa: E731
     breaklines = lambda path: read_breaklines(path, seeds.EPSG)  # noqa: E731
     return [
         _single("boundary geojson", seeds.geojson("polygons"), "b.geojson", boundary),
         _single("boundary gpkg", seeds.gpkg("polygons"), "b.gpkg", boundary),
         _single("boundary wkt", wkt, "b.wkt", boundary),
-        _single("models geojson", seeds.geojson("polygons"), "m.geojson", lambda path: read_polygons(path, 25832)),
-        _single("models gpkg", seeds.gpkg("polygons"), "m.gpkg", lambda path: read_polygons(path, 25832)),
+        _single("models geojson", seeds.geojson("polygons"), "m.geojson", models),
+        _single("models gpkg", seeds.gpkg("polygons"), "m.gpkg", models),
         _single("breaklines geojson", seeds.geojson("lines"), "l.geojson", breaklines),
         _single("breaklines gpkg", seeds.gpkg("lines"), "l.gpkg", breaklines),
         _single("breaklines dxf", seeds.DXF.encode(), "l.dxf", breaklines),
