@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -269,7 +270,8 @@ def read_boundary(source: str, crs: str = "") -> Boundary:
             return found if found.piles else replace(found, polygon_name=names[0])
         numbered = [own or str(number) for number, own in enumerate(names, start=1)]
         return boundary_of_piles(list(zip(numbered, polygons, strict=True)), path.name, note, path)
-    regular_file(path)
+    if os.path.lexists(path):
+        regular_file(path)
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
