@@ -33,11 +33,19 @@ def of_heights(adjusted: AdjustedBlock) -> list[Finding]:
     name, expected = "heights of control together", f"ratio 1; chance {100.0 * SIGNIFICANCE:g} %"
     value = f"{found.ratio:.2g} times as large as expected from σ ({found.freedom} of {found.count} determined)"
     counting = [one for one in found.patterns if min(one.p, found.p) < CHANCE and one.warp >= POOR_FIT * found.sigma]
+    if counting and _has_random_field(adjusted):
+        # a field takes a bowl only as far as its variance allows: what is left at control is its own, not control's
+        words = _in_words(adjusted, counting[0], min(counting[0].p, found.p))
+        return [Finding(name, value, expected, words, "attention")]
     if counting:
         return doubt(name, value, expected, "doubtful", _in_words(adjusted, counting[0], min(counting[0].p, found.p)))
     if found.p < SIGNIFICANCE and found.ratio >= POOR_FIT:
         return doubt(name, value, expected, "doubtful", _together(found))
     return []
+
+
+def _has_random_field(adjusted: AdjustedBlock) -> bool:
+    return any(family == "collocation" for family, _ in adjusted.block.settings.adjustment.additional_parameters)
 
 
 def _in_words(adjusted: AdjustedBlock, one: HeightPattern, p: float) -> str:
