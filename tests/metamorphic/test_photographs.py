@@ -42,8 +42,9 @@ TURNED = 1e-5
 and it ends where a step changes nothing by more than 0.01 σ."""
 PICKETS = 1e-4
 """σ, of heights by matching, whose steps end at .005 of the spacing of the posts of a window (3e-6 seen)."""
-ROUNDED = 1e-6
-"""σ, where coordinates of 5e6 m, or degrees, are rounded to some 1e-9 m in files: 1e-7 of the σ of control."""
+ROUNDED = 5e-6
+"""σ, where coordinates of 5e6 m, or degrees, are rounded to some 1e-9 m in files: 1e-7 of the σ of control, and ten
+times that in normalised residuals of control that little else holds."""
 RASTER = 1e-5
 """σ, of rasters: a cell has 32 bit."""
 HEIGHT = 2.0**-17
