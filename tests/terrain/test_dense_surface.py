@@ -141,12 +141,13 @@ def test_medians_keep_few_cells_in_memory(monkeypatch):
     samples = dense_file._samples(o)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    sigma, matching, shared, photographs = (np.concatenate(part) for part in zip(*samples, strict=True))
+    sigma, matching, shared, relative, photographs = (np.concatenate(part) for part in zip(*samples, strict=True))
     assert 10_000 < len(sigma) <= 20_000 + count
     assert peak < 100.0 * side * side  # of one tile; all of them are sixty times as much
     assert np.median(matching) == 0.1
     np.testing.assert_allclose(shared, 0.05)
     np.testing.assert_allclose(sigma, np.hypot(matching, shared))
+    np.testing.assert_allclose(relative, shared)
     assert (photographs == 2).all()
 
 

@@ -399,7 +399,7 @@ def _systems_in_words(reader: Reader, other: Reader) -> list[str]:
     said = []
     for one, second in ((reader, other), (other, reader)):
         if second.plan and not one.plan:
-            said.append(f"{one.path.name} states no CRS; it is taken for {system_in_words(second.plan)}, as "
+            said.append(f"{one.path.name} has no CRS; it is taken for {system_in_words(second.plan)}, as "
                         f"{second.path.name} is")  # fmt: skip
         if heights_of(second.system) and not heights_of(one.system):
             said.append(f"{one.path.name} does not say in which system its heights are; they are taken for those of "
