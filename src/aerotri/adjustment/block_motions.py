@@ -255,7 +255,10 @@ def _of_length_one(effects: _Effects, unit: np.ndarray) -> tuple[csr_array, np.n
     rounding.
     """
     unit = unit.copy()
-    length = np.linalg.norm(effects.reach * unit[:7], axis=1)
+    parts = np.abs(effects.reach * unit[:7])
+    # a state that ran away has effects whose squares are beyond all numbers
+    largest = np.maximum(parts.max(axis=1, initial=0.0), 1e-300)
+    length = largest * np.linalg.norm(parts / largest[:, None], axis=1)
     by_length = np.where(length > 0.0, 1.0 / np.maximum(length, 1e-300), 1.0)
     rows = csr_array(diags_array(by_length) @ effects.rows)
     followed = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=0)).ravel())
