@@ -180,7 +180,7 @@ def test_boundaries_in_their_own_crs(tmp_path):
         "wkt": (plain.wkt, ""),
     }
     for name, (source, note) in cases.items():
-        found = read_boundary(str(source), 32632)
+        found = read_boundary(str(source), "EPSG:32632")
         assert found.area == pytest.approx(plain.area, rel=1e-5), name
         assert found.polygon.hausdorff_distance(plain) < 0.01, name
         assert note in found.note, name

@@ -41,7 +41,7 @@ def _checked(boundary, names):
 @pytest.mark.parametrize("geometry", [BOTH, COLLECTION], ids=["multipolygon", "collection"])
 @pytest.mark.parametrize("srid", ["", "SRID=32632;"])
 def test_parts_of_a_text_are_piles(geometry, srid):
-    _checked(read_boundary(srid + geometry.wkt, 32632), ["1", "2"])
+    _checked(read_boundary(srid + geometry.wkt, "EPSG:32632"), ["1", "2"])
 
 
 @pytest.mark.parametrize("geometry", [BOTH, COLLECTION], ids=["multipolygon", "collection"])
@@ -55,15 +55,15 @@ def test_parts_of_a_file_of_text_and_of_a_shape_are_piles(geometry, tmp_path):
 
 @pytest.mark.parametrize("geometry", [BOTH, COLLECTION], ids=["multipolygon", "collection"])
 def test_parts_of_a_feature_have_its_name_and_a_number(geometry, tmp_path):
-    _checked(read_boundary(_geojson(tmp_path / "a.geojson", [geometry], ["dump"]), 32632), ["dump 1", "dump 2"])
-    _checked(read_boundary(_geojson(tmp_path / "b.geojson", [geometry], [""]), 32632), ["1", "2"])
+    _checked(read_boundary(_geojson(tmp_path / "a.geojson", [geometry], ["dump"]), "EPSG:32632"), ["dump 1", "dump 2"])
+    _checked(read_boundary(_geojson(tmp_path / "b.geojson", [geometry], [""]), "EPSG:32632"), ["1", "2"])
     third = shapely.box(40.0, 4.0, 50.0, 14.0)
-    found = read_boundary(_geojson(tmp_path / "c.geojson", [third, geometry], ["", "dump"]), 32632)
+    found = read_boundary(_geojson(tmp_path / "c.geojson", [third, geometry], ["", "dump"]), "EPSG:32632")
     assert [name for name, _ in found.piles] == ["1", "dump 1", "dump 2"]
 
 
 def test_a_single_part_keeps_the_name_of_its_feature(tmp_path):
-    found = read_boundary(_geojson(tmp_path / "a.geojson", [shapely.MultiPolygon([HOLED])], ["dump"]), 32632)
+    found = read_boundary(_geojson(tmp_path / "a.geojson", [shapely.MultiPolygon([HOLED])], ["dump"]), "EPSG:32632")
     assert (found.piles, found.polygon_name) == ((), "dump")
     assert found.area == pytest.approx(HOLED.area)
 
@@ -82,7 +82,7 @@ def test_a_collection_in_a_geopackage(tmp_path):
             "INSERT INTO mixed VALUES (?)",
             (b"GP\x00\x01" + struct.pack("<i", 32632) + shapely.to_wkb(mixed, byte_order=1),),
         )
-    _checked(read_boundary(str(path), 32632), ["dump 1", "dump 2"])
+    _checked(read_boundary(str(path), "EPSG:32632"), ["dump 1", "dump 2"])
     with sqlite3.connect(path) as database:
         database.execute("INSERT INTO gpkg_geometry_columns VALUES ('mixed', 'geom', 32632)")
     assert [row.kind for _, _, rows in read_geopackage(path) for row in rows] == ["MultiPolygon", "other"]
