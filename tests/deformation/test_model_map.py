@@ -89,7 +89,7 @@ def test_geopackage(tmp_path, order, z, envelope, several):
     assert found.names == (("a", "b"), ("b", "c"))
     np.testing.assert_array_equal(found.numbers(GRID, 0, 0, 12, 10), EXPECTED)
     assert found.note == ""
-    moved = read_polygons(tmp_path / "m.gpkg", 25833)
+    moved = read_polygons(tmp_path / "m.gpkg", "EPSG:25833")
     assert "from EPSG:25832 to EPSG:25833" in moved.note
     assert np.abs(moved.bounds - found.bounds)[:, 0].min() > 1000.0
 
