@@ -295,7 +295,7 @@ def test_camera_files_that_will_not_do(files):
         (files / name).write_text(text)
         with pytest.raises(InputError, match=re.escape(says)):
             read_project(request(files, camera=CameraSpec(file=files / name)))
-    with pytest.raises(InputError, match=r"none\.toml: cannot be read"):
+    with pytest.raises(InputError, match=r"none\.toml: there is no such file"):
         read_project(request(files, camera=CameraSpec(file=files / "none.toml")))
 
 
