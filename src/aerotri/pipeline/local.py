@@ -13,6 +13,7 @@ from aerotri.adjustment.datum import FREEDOMS, nothing_holds, restore_datum
 from aerotri.adjustment.defects import checked_factor, point_without_rays_enough
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.prepare import Prepared, prepare
+from aerotri.adjustment.runaway_points import with_runaways_back
 from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.weak_geometry import go_on_without, minimise_tied
@@ -103,7 +104,7 @@ def adjust_local(block: Block, report: Report | None, given_points: np.ndarray |
     _refuse_without_datum(prepared)
     settings = block.settings.adjustment
     options = SolveOptions(settings.max_iterations, settings.robust, report)
-    stand = _Stand(*_determined(minimise_tied(prepared, options, _redundancy)), block)
+    stand = _Stand(*_determined(_tied(prepared, options)), block)
     stand = _without_gross_errors(stand, options)
     stand = _with_fields(stand, options)
     stand = _with_photograph_fields(stand, options)
@@ -114,6 +115,12 @@ def adjust_local(block: Block, report: Report | None, given_points: np.ndarray |
     delivered = _without_loose_points(_delivered(stand), options)
     timings = {"start_values": started - begun, "solve": delivered.solved - started}
     return _with_words(delivered, timings)
+
+
+def _tied(prepared: Prepared, options: SolveOptions) -> tuple[Prepared, Solution]:
+    """The first solution, without what is too weak, and with the points that ran away brought back."""
+    prepared, solution = minimise_tied(prepared, options, _redundancy)
+    return with_runaways_back(prepared, solution, options, _redundancy)
 
 
 def _refuse_without_datum(prepared: Prepared) -> None:
