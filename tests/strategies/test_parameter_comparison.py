@@ -266,3 +266,13 @@ def test_a_lens_with_start_values_is_not_held(block):
         for part in ({"lens": {"k1": prior}}, {"brown": {"K1": prior}}):
             own = replace(block, cameras=(replace(camera, **part), *block.cameras[1:]))
             assert (() in candidate_sets(own)) == there
+
+
+def test_a_field_is_tried_beside_the_lens(block):
+    """A field alone holds the lens near zero where the image points hardly determine it, and bends the block."""
+    for model in ("frame", "ultracam_d", "dmc"):
+        own = replace(block, cameras=tuple(replace(camera, model=model) for camera in block.cameras))
+        families = [{family for family, _ in choice} for choice in candidate_sets(own)]
+        beside = [one for one in families if "collocation" in one]
+        assert beside
+        assert all(one & {"lens", "brown", "bluh"} for one in beside)

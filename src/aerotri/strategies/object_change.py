@@ -24,6 +24,8 @@ from aerotri.results.parameter_comparison import AdjustedObject, SetOutcome
 
 MOST_LEVERAGE = 10.0
 """Leverage beyond which the change of the object is not the image points' to decide [C]."""
+WITHOUT_LENS = ("collocation", "ultracam_d")
+"""Families that hold the lens as it is given, or near it."""
 FEWEST_RAYS = 3
 """Rays of the points that the object is compared by [C]: two rays show no error across their plane."""
 FEWEST_POINTS = 12
@@ -103,8 +105,11 @@ class FarMoved:
 
 
 def frees_the_lens(outcome: SetOutcome) -> bool:
-    """Whether a set has parameters other than those of a random field, which stays near the lens that was given."""
-    return any(family != "collocation" for family, _ in outcome.choice)
+    """Whether a set has parameters of the lens.
+
+    A random field stays near the lens that was given, and CCDs that are moved one by one leave it as it is.
+    """
+    return any(family not in WITHOUT_LENS for family, _ in outcome.choice)
 
 
 def far_moved(outcomes: Sequence[SetOutcome]) -> dict[str, FarMoved]:

@@ -33,11 +33,14 @@ NEGLIGIBLE = 4.0
 ratio of 7."""
 
 LENS = "lens:k1+k2+k3+p1+p2"
-COMMON = ("brown", LENS, "bluh:1-12", "legendre:5x5", f"{LENS},collocation:13x9")
+FIELD = "collocation:13x9"
+COMMON = ("brown", LENS, "bluh:1-12", "legendre:5x5", f"{LENS},{FIELD}")
 OF_MODEL = {
-    "ultracam_d": ("ultracam_d:42-73", "bluh:1-12,ultracam_d:42-73", "ultracam_d:42-73,collocation:13x9"),
-    "dmc": ("dmc", "bluh:1-12,dmc:30-41+74-77", "dmc:30-41+74-77,collocation:13x9"),
+    "ultracam_d": ("ultracam_d:42-73", "bluh:1-12,ultracam_d:42-73", f"bluh:1-12,ultracam_d:42-73,{FIELD}"),
+    "dmc": ("dmc", "bluh:1-12,dmc:30-41+74-77", f"bluh:1-12,dmc:30-41+74-77,{FIELD}"),
 }
+"""Sets for cameras of one model. A random field is tried beside parameters of the lens, never in their place [C]: its
+prior holds what the image points hardly determine near zero, and a lens held near zero bends the block."""
 
 
 OF_SMALL_BLOCKS = ("brown:K1+K2+K3+P1+P2", LENS, "bluh:1-12", "none")
