@@ -12,7 +12,7 @@ from aerotri.adjustment.track import with_named_strips
 from aerotri.conventions import FilePath
 from aerotri.functional_model.additional_parameters import AUTO
 from aerotri.observations import Block
-from aerotri.pipeline.choosing import ParameterChoice, choose_again, choose_parameters, with_reason
+from aerotri.pipeline.choosing import ParameterChoice, choose_again, choose_parameters, with_reason, with_rival
 from aerotri.pipeline.components import with_variance_components
 from aerotri.pipeline.control_doubts import doubts_at_start, with_control_doubts
 from aerotri.pipeline.in_frame import adjust_in_frame
@@ -106,6 +106,7 @@ def _adjusted(
         found = adjust_in_frame(block, report, given_points, geoid)
     if block.settings.adjustment.variance_components == "on":
         found = with_variance_components(block, found, report, geoid)
+    found = found if choice is None else with_rival(found, choice)
     found = judged(with_relative(with_model_part(found)))
     if tested and asks_for_test(block):
         found = with_shutter_test(found, report)

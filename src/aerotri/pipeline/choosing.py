@@ -21,6 +21,7 @@ from aerotri.results.adjustment import Adjustment
 from aerotri.results.parameter_comparison import Choice, ParameterComparison, SetOutcome
 from aerotri.strategies.compared_sets import compare_sets
 from aerotri.strategies.moving_sets import moving_outcomes, names_of_strips
+from aerotri.strategies.other_set import set_difference
 from aerotri.strategies.parameter_choice import Chosen, choose, sets_to_choose_from
 from aerotri.strategies.parameter_comparison import (
     Candidate,
@@ -155,6 +156,15 @@ def _prepared_without(block: Block, geoid: FilePath | None) -> Prepared:
     if nothing_holds(prepared.system.unknowns, prepared.system.extras):
         raise failure(prepared.system, "rank deficient", f"the datum is free in {', '.join(FREEDOMS)}")
     return prepared
+
+
+def with_rival(found: Adjustment, choice: ParameterChoice) -> Adjustment:
+    """The adjustment with what the set changes that the choice could not tell from the one it took."""
+    rival = choice.chosen.rival
+    if rival is None or choice.bare.settings.adjustment.model_part == "off":
+        return found
+    candidate = Candidate(rival.choice, rival.groups, rival.kind)
+    return replace(found, other=set_difference(found, candidate, rival.weight, choice.bare, choice.strips))
 
 
 def with_reason(found: Adjustment, choice: ParameterChoice) -> Adjustment:

@@ -6,14 +6,17 @@ import time
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.diagnosis.moving_errors import control_in_words, model_part_in_words
+from aerotri.diagnosis.other_set import other_set_in_words
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.in_crs import with_model_of
-from aerotri.results.model_part import FIELD, GROUPS, ControlEvidence, ModelPart
+from aerotri.results.model_part import FIELD, GROUPS, ControlEvidence, ModelPart, OtherSet, SetDifference
 from aerotri.statistics.cluster_fields import fitted_field, root_of_field
 from aerotri.statistics.cluster_test import LEVEL
 from aerotri.statistics.clusters import cluster_schemes
@@ -73,15 +76,17 @@ def with_model_part(found: Adjustment) -> Adjustment:
     u = system.unknowns
     settings = u.block.settings.adjustment
     reason = why_not(settings.model_part, len(u.images), solution.status, sigma0)
-    if reason:
-        return _with(found, replace(found.local, model_part=ModelPart(reason=reason)), begun)
+    if reason and not _counts(found.other):
+        return _with(found, replace(found.local, model_part=ModelPart(reason=reason, other_set=_told(found))), begun)
     factor = system.factorise(solution.equations)
-    stage = _Stage(found, factor, None if settings.is_free else control_equations(system, solution, factor))
-    part, excess = _of_clusters(stage)
+    says = not reason and not settings.is_free
+    stage = _Stage(found, factor, control_equations(system, solution, factor) if says else None)
+    part, excess = (ModelPart(reason=reason), None) if reason else _of_clusters(stage)
     stage = stage if excess is None else stage.again()
-    part = replace(part, control=_control_says(stage, part, excess))
+    excess = _beside(excess, found)
+    part = replace(part, control=_control_says(stage, part, excess), other_set=_told(found))
     covariance = found.local.points.covariance[u.points]
-    if not settings.is_free:
+    if says:
         model = None if excess is None else (excess.root, excess.points)
         part = replace(part, common=common_parts(*stage.equations, covariance, sigma0, model))
     if excess is None:
@@ -89,6 +94,31 @@ def with_model_part(found: Adjustment) -> Adjustment:
     part = with_ratios(part, growth_of(covariance, excess.points))
     local = replace(spread_over_block(u, found.local, excess.images, excess.shared, excess.points), model_part=part)
     return replace(_with(found, local, begun), model=excess.root)
+
+
+def _told(found: Adjustment) -> OtherSet | None:
+    return None if found.other is None else found.other.other
+
+
+def _counts(difference: SetDifference | None) -> bool:
+    """Whether another set of parameters makes σ larger."""
+    return difference is not None and difference.other.share > 0.0
+
+
+def _beside(excess: Excess | None, found: Adjustment) -> Excess | None:
+    """The model part with what another set of additional parameters would change."""
+    difference = found.other
+    if difference is None or not _counts(difference):
+        return excess
+    root = difference.root
+    columns = root.points.astype(float)
+    own = excess_of_root(found.system, found.solution, root, columns @ np.swapaxes(columns, 1, 2))
+    if excess is None:
+        return own
+    return Excess(
+        excess.images + own.images, excess.shared + own.shared, excess.points + own.points,
+        replace(excess.root, beside=root),
+    )  # fmt: skip
 
 
 def _of_clusters(stage: _Stage) -> tuple[ModelPart, Excess | None]:
@@ -124,17 +154,23 @@ def _control_says(stage: _Stage, part: ModelPart, excess: Excess | None) -> Cont
         return None
     of_groups = part.method == GROUPS
     widening, scale = of_few(part.clusters) if of_groups else 1.0, 1.0
-    of_model = model_of_control(stage.control, None if excess is None else excess.root, widening, stage.sigma0)
+    root = None if excess is None else excess.root
+    of_photographs, of_sets = (
+        (replace(root, beside=None), root.beside) if root is not None and part.counts else (None, root)
+    )
+    of_model = model_of_control(stage.control, of_photographs, widening, stage.sigma0)
     power, squares = along_model(stage.control, of_model, stage.sigma0)
-    if excess is not None and len(squares):
+    if of_photographs is not None and len(squares):
         scale = scale_of_model(power, squares, part.clusters - 1 if of_groups else FREEDOM_OF_FIELDS)
-    return replace(evidence(stage.control, widening * of_model, stage.sigma0), scale=scale)
+    whole = widening * of_model + model_of_control(stage.control, of_sets, 1.0, stage.sigma0)
+    return replace(evidence(stage.control, whole, stage.sigma0), scale=scale)
 
 
 def _with(found: Adjustment, local: AdjustedBlock, begun: float) -> Adjustment:
     """The adjustment with the model part of `local` in both frames, told among the warnings, its time counted."""
     part = local.model_part or ModelPart()
-    said = [text for text in (model_part_in_words(part), control_in_words(part.control)) if text]
+    words = model_part_in_words(part), other_set_in_words(part), control_in_words(part.control)
+    said = [text for text in words if text]
 
     def told(result: AdjustedBlock) -> AdjustedBlock:
         o = result.outcome

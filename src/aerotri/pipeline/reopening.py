@@ -75,7 +75,8 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     if saved.verdict:
         result = replace(result, outcome=replace(result.outcome, verdict=saved.verdict, reasons=saved.reasons))
     delivered = result if frame is None else transform_result(result, block, frame)
-    found = with_relative(with_model_part(Adjustment(delivered, result, system, solution, frame)))
+    opened = Adjustment(delivered, result, system, solution, frame, other=saved.difference(system.unknowns))
+    found = with_relative(with_model_part(opened))
     return with_purpose(with_evidence(found)) if saved.verdict else judged(found)
 
 

@@ -112,8 +112,9 @@ def write_adjustment(
     with atomic_folder(target, own=RESULT_NAMES) as folder:
         write_block(result.block, folder / "block")
         write_solution(
-            folder / "solution.npz", adjustment.system, adjustment.solution, adjustment.local, adjustment.frame
-        )
+            folder / "solution.npz", adjustment.system, adjustment.solution, adjustment.local, adjustment.frame,
+            adjustment.other,
+        )  # fmt: skip
         timings = {**result.outcome.timings_s, "write": time.perf_counter() - begun}
         found = evaluate(adjustment)
         if plots:

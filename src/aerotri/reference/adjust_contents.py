@@ -224,6 +224,27 @@ ADJUSTMENT = (
         optional=True,
     ),
     Item(
+        "model_part.other_set",
+        "object?",
+        "Additional parameters that the choice could not tell from those taken; null where the choice was not the "
+        "program's, or there are none.",
+    ),
+    Item("model_part.other_set.set", "text", "The parameters, as on the command line.", optional=True),
+    Item("model_part.other_set.weight", "number", "Probability that they are the better ones.", optional=True),
+    Item("model_part.other_set.plan_m", "number?", "RMS of the change of the points in plan.", "m", optional=True),
+    Item("model_part.other_set.height_m", "number?", "The same in height.", "m", optional=True),
+    Item(
+        "model_part.other_set.plan_sigma", "number?", "RMS of the change of X and Y over σ of the noise.", optional=True
+    ),
+    Item("model_part.other_set.height_sigma", "number?", "The same of Z.", optional=True),
+    Item(
+        "model_part.other_set.unexplained",
+        "number",
+        "Share of the squares of the changes that the σ of both sets do not explain. Times the probability it is what "
+        "total σ² contains of them.",
+        optional=True,
+    ),
+    Item(
         "model_part.common[]",
         "object",
         "Parts of σ of the object points, RMS over the points: what all have in common, and what is local. Their "

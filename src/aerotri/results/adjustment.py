@@ -8,7 +8,7 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.coordinates import LocalFrame
 from aerotri.results.adjusted_block import AdjustedBlock
-from aerotri.results.model_part import ModelRoot
+from aerotri.results.model_part import ModelRoot, SetDifference
 from aerotri.results.parameter_comparison import ParameterComparison
 
 
@@ -22,6 +22,7 @@ class Adjustment:
     frame : the local frame, None for a block in local coordinates.
     model : what the model part of σ is made of, for σ of whatever follows from the unknowns; None where there is none.
     compared : the sets of additional parameters that were compared where the choice was left to the program.
+    other : how another set differs that the choice could not tell from the one it took; None where there is none.
     """
 
     result: AdjustedBlock
@@ -31,3 +32,4 @@ class Adjustment:
     frame: LocalFrame | None = None
     compared: ParameterComparison | None = None
     model: ModelRoot | None = None
+    other: SetDifference | None = None

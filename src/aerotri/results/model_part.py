@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -52,12 +52,76 @@ class ModelRoot:
     ----------
     images : (n, 6, k) of centre and rotation unknowns. shared : (s, k). points : (P, 3, k) m, in single precision.
     noise : σ̂0², widened as F·Fᵀ is, where this contains the noise of the rays, 0 where it does not.
+    beside : columns without noise of another cause; None where there are none.
     """
 
     images: np.ndarray
     shared: np.ndarray
     points: np.ndarray
     noise: float
+    beside: ModelRoot | None = None
+
+    @property
+    def parts(self) -> tuple[ModelRoot, ...]:
+        """Roots of one cause each, whose model parts add up."""
+        own = () if not self.shared.shape[1] else (replace(self, beside=None),)
+        return own if self.beside is None else (*own, *self.beside.parts)
+
+
+@dataclass(frozen=True)
+class OtherSet:
+    """A set of additional parameters that the choice could not tell from the one it took.
+
+    Parameters
+    ----------
+    set : its name. weight : probability that it predicts better than the one taken.
+    plan_m, height_m : RMS over the points of the difference of the object. plan_sigma, height_sigma : of the
+        difference over the σ of the noise, RMS.
+    unexplained : share of the squares of the differences that the σ of the two sets do not explain.
+    """
+
+    set: str
+    weight: float
+    plan_m: float = float("nan")
+    height_m: float = float("nan")
+    plan_sigma: float = float("nan")
+    height_sigma: float = float("nan")
+    unexplained: float = 0.0
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> OtherSet:
+        """From JSON, null of what is not known."""
+        values: dict[str, Any] = {key: float("nan") if value is None else value for key, value in content.items()}
+        return cls(**values)
+
+    @property
+    def share(self) -> float:
+        """Of the squares of the differences that counts in total σ."""
+        return self.weight * self.unexplained
+
+
+@dataclass(frozen=True, eq=False)
+class SetDifference:
+    """How the unknowns differ between the set of additional parameters that was taken and another one.
+
+    Parameters
+    ----------
+    other : what is told of it.
+    images : (n, 6) of centre and rotation unknowns. shared : (s,). points : (P, 3) m; rows as in `Unknowns`, in the
+        frame there.
+    """
+
+    other: OtherSet
+    images: np.ndarray
+    shared: np.ndarray
+    points: np.ndarray
+
+    @property
+    def root(self) -> ModelRoot:
+        """Its part of the model part of σ."""
+        size = float(np.sqrt(self.other.share))
+        points = (size * self.points[..., None]).astype(np.float32)
+        return ModelRoot(size * self.images[..., None], size * self.shared[:, None], points, 0.0)
 
 
 @dataclass(frozen=True)
@@ -111,6 +175,7 @@ class ModelPart:
     ratio_plan, ratio_height : median of σ total over σ of the object points, 1 where there is no model part.
     reason : why there is no model part, '' otherwise.
     control : what control points say; None where there are none. common : the parts of σ of the points.
+    other_set : parameters that predict as well as those taken and give another object; None where there are none.
     """
 
     scheme: str = ""
@@ -123,6 +188,7 @@ class ModelPart:
     reason: str = ""
     control: ControlEvidence | None = None
     common: tuple[CommonPart, ...] = ()
+    other_set: OtherSet | None = None
 
     @property
     def counts(self) -> bool:
@@ -153,4 +219,5 @@ class ModelPart:
         own["tests"] = [plain_keys(test) for test in self.tests]
         own["common"] = [plain_keys(part) for part in self.common]
         own["control"] = None if self.control is None else plain_keys(self.control)
+        own["other_set"] = None if self.other_set is None else plain_keys(self.other_set)
         return {key: plain(value) for key, value in own.items()}

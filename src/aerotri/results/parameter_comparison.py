@@ -69,6 +69,7 @@ class AdjustedObject:
     point : (k,) rows of the block's points that have enough rays. xyz : (k, 3) m.
     reach : (k,) m per rad, how far a point moves where all its rays err and the photographs stay; NaN where unknown.
     ray : (m,) rows of the block's image points. residual : (m, 2) rad, times the root of their robust weight.
+    free : whether nothing but the datum holds the block, so that only its shape has a meaning.
     """
 
     point: np.ndarray
@@ -76,6 +77,7 @@ class AdjustedObject:
     reach: np.ndarray
     ray: np.ndarray
     residual: np.ndarray
+    free: bool = False
 
 
 NOTHING_KNOWN = Evidence(np.zeros(0), np.zeros(0), np.zeros(0), float("nan"))

@@ -26,6 +26,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from aerotri.results.adjustment import Adjustment
+from aerotri.results.model_part import ModelRoot
 from aerotri.statistics.cluster_fields import (
     NODES,
     SEEN,
@@ -120,6 +121,18 @@ def is_of_camera(found: Adjustment) -> bool:
     """Whether the model part of σ is of errors that all photographs of a camera share: a field takes its place."""
     part = found.local.model_part
     return part is not None and part.counts and (part.clusters == 1 or part.scheme == CAMERA)
+
+
+def model_beside_field(found: Adjustment) -> ModelRoot | None:
+    """The root of the model part of σ beside what is known of the field of the cameras; None where there is none.
+
+    A field takes the place of a model part that is of the same errors, and not of what another set of parameters would
+    change.
+    """
+    root = found.model
+    if root is None or known_field(found) is None or not is_of_camera(found):
+        return root
+    return root.beside
 
 
 def too_little_said(found: Adjustment) -> str:

@@ -76,9 +76,9 @@ def common_parts(
     columns = modes(solution.state.points[rows])
     noise, known = _of_modes(system, solution, factor, rows, columns)
     total = sigma0**2 * noise
-    if model is not None:
-        along = np.einsum("pia,pim->am", columns, model[0].points[rows].astype(float))
-        total = total + positive_part((along @ along.T)[None], model[0].noise * (noise - known)[None])[0]
+    for part in () if model is None else model[0].parts:
+        along = np.einsum("pia,pim->am", columns, part.points[rows].astype(float))
+        total = total + positive_part((along @ along.T)[None], part.noise * (noise - known)[None])[0]
     parts, count = [], len(rows)
     sums = (sigma0**2 * np.diagonal(noise) / count, np.diagonal(total) / count)
     whole = [values[rows].mean(axis=0) for values in (variance, variance + of_model)]

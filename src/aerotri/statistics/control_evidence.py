@@ -99,11 +99,12 @@ def model_of_control(equations: ControlEquations, root: ModelRoot | None, wideni
     ----------
     root : of the model part, None where there is none. widening : of the variances, that it contains already.
     """
-    if root is None:
-        return np.zeros_like(equations.cofactors)
-    columns = equations.weight[:, None] * root.points[equations.rows, equations.axes].astype(float)
-    noise = root.noise * (equations.cofactors - equations.known)
-    return positive_part((columns @ columns.T)[None], noise[None])[0] / (widening * sigma0**2)
+    found = np.zeros_like(equations.cofactors)
+    for part in () if root is None else root.parts:
+        columns = equations.weight[:, None] * part.points[equations.rows, equations.axes].astype(float)
+        noise = part.noise * (equations.cofactors - equations.known)
+        found += positive_part((columns @ columns.T)[None], noise[None])[0]
+    return found / (widening * sigma0**2)
 
 
 def along_model(equations: ControlEquations, of_model: np.ndarray, sigma0: float) -> tuple[np.ndarray, np.ndarray]:

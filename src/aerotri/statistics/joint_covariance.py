@@ -128,13 +128,15 @@ def joint_cofactors(
     turn = _in_angles(u, state, chosen)
     model = None
     if root is not None:
-        of_root = np.stack([_taken(chosen[k], axis, root.images, root.shared, root.points) for k, axis in columns])
-        model = of_root @ of_root.T
-        noise = np.zeros_like(model)
-        if root.noise > 0.0:
-            own = known_root_of(system, shared, points)
-            noise = root.noise * (q - own.T @ own)
-        model = turn @ positive_part(model[None], noise[None])[0] @ turn.T
+        model = np.zeros_like(q)
+        for part in root.parts:
+            of_root = np.stack([_taken(chosen[k], axis, part.images, part.shared, part.points) for k, axis in columns])
+            noise = np.zeros_like(q)
+            if part.noise > 0.0:
+                own = known_root_of(system, shared, points)
+                noise = part.noise * (q - own.T @ own)
+            model += positive_part((of_root @ of_root.T)[None], noise[None])[0]
+        model = turn @ model @ turn.T
     q = turn @ q @ turn.T
     return 0.5 * (q + q.T), model
 

@@ -29,6 +29,15 @@ def model_of_functions(
     cofactors : (k/size, size, size) CᵀQC in the datum of the block, where it is not that of Q. Of what is known
         beforehand of a free block, as a σ of the principal distance, the datum takes nothing away.
     """
+    parts = [_of_part(system, solution, part, unknowns, solved, size, cofactors) for part in root.parts]
+    return np.sum(parts, axis=0)
+
+
+def _of_part(
+    system: NormalSystem, solution: Solution, root: ModelRoot, unknowns: np.ndarray, solved: np.ndarray, size: int,
+    cofactors: np.ndarray | None,
+) -> np.ndarray:  # fmt: skip
+    """The same of columns of one cause."""
     n = 6 * len(root.images)
     count = unknowns.shape[1] // size
     along = (root.images.reshape(n, -1).T @ unknowns[:n] + root.shared.T @ unknowns[n:]).reshape(-1, count, size)

@@ -111,8 +111,8 @@ def relative_covariances(
     d = shape.datum
     noise = _left(q[0], d.points, d.q_points, d.both), _left(q[1], d.images[:, :3], d.q_images[:, :3], d.both)
     points, centres, similarity = (sigma0**2 * part for part in (*noise, d.both))
-    if root is not None:
-        model = _model_parts(system, solution, factor, shape, noise, root)
+    for part in () if root is None else root.parts:
+        model = _model_parts(system, solution, factor, shape, noise, part)
         points, centres, similarity = (a + b for a, b in zip((points, centres, similarity), model, strict=True))
     near = neighbours(system, solution, factor, sigma0, shape, root)
     free = free_of(system.unknowns, shape.middle)
@@ -212,7 +212,7 @@ def _model_parts(
     system: NormalSystem, solution: Solution, factor: Factor, shape: Shape, noise: tuple[np.ndarray, np.ndarray],
     root: ModelRoot,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-    """The model parts of points (P, 3, 3), centres (n, 3, 3) and of the similarity (7, 7)."""
+    """The model parts of points (P, 3, 3), centres (n, 3, 3) and of the similarity (7, 7), of columns of one cause."""
     d = shape.datum
     motion = _motion_of_root(shape, root)
     points = np.concatenate([part @ np.swapaxes(part, 1, 2) for part in _moved_points(shape, root, motion)])
@@ -325,12 +325,13 @@ def _of_pairs(
     g, qa = (part[first, 2] - part[second, 2] for part in (d.points, d.q_points))
     left = own - 2.0 * np.sum(g * qa, axis=1) + np.einsum("ka,ab,kb->k", g, d.both, g)
     cofactor, model = np.stack([own, left]), np.zeros((2, len(first)))
-    if root is not None:
-        of_root = (root.points[first, 2] - root.points[second, 2]).astype(float)
-        columns = np.stack([of_root, of_root - g @ _motion_of_root(shape, root)])
-        model = np.sum(columns**2, axis=2)
-        if root.noise > 0.0:
+    for part in () if root is None else root.parts:
+        of_root = (part.points[first, 2] - part.points[second, 2]).astype(float)
+        columns = np.stack([of_root, of_root - g @ _motion_of_root(shape, part)])
+        own = np.sum(columns**2, axis=2)
+        if part.noise > 0.0:
             known, of_motion = known_root_of(system, shared, points), known_root_of(system, d.q_shared, d.q_points)
             both = np.stack([known, known - of_motion @ g.T])
-            model = np.maximum(model - root.noise * (cofactor - np.sum(both**2, axis=1)), 0.0)
+            own = np.maximum(own - part.noise * (cofactor - np.sum(both**2, axis=1)), 0.0)
+        model += own
     return cofactor, model

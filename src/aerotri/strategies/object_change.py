@@ -43,7 +43,8 @@ def object_of(system: NormalSystem, solution: Solution) -> AdjustedObject:
     residual = np.where(used[:, None], equations.residual * (root / focal)[:, None], 0.0)
     count, reach = _reach(u, solution.state.centre, solution.state.points, used)
     many = count >= FEWEST_RAYS
-    return AdjustedObject(u.points[many], solution.state.points[many], reach[many], rays.source, residual)
+    free = u.block.settings.adjustment.is_free
+    return AdjustedObject(u.points[many], solution.state.points[many], reach[many], rays.source, residual, free)
 
 
 def _reach(
@@ -82,6 +83,20 @@ def leverage(one: SetOutcome, other: SetOutcome) -> float:
     of_image = float(np.sqrt(np.mean(np.sum(in_image**2, axis=1))))
     # some points have rays that hardly part: the usual point tells what image points reach
     return float(np.sqrt(np.mean(np.sum(moved**2, axis=1)))) / max(float(np.median(reach[known])) * of_image, 1e-300)
+
+
+def movement(one: SetOutcome, other: SetOutcome) -> float:
+    """m, RMS of the distances between the points of two sets, of a free block of its shape; NaN of too few."""
+    first, second = one.object, other.object
+    if first is None or second is None:
+        return float("nan")
+    _, of_first, of_second = np.intersect1d(first.point, second.point, return_indices=True)
+    if len(of_first) < FEWEST_POINTS:
+        return float("nan")
+    xyz = first.xyz[of_first]
+    moved = second.xyz[of_second] - xyz
+    moved = _without_similarity(xyz, moved) if first.free else moved
+    return float(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
 
 
 def _without_similarity(xyz: np.ndarray, moved: np.ndarray) -> np.ndarray:

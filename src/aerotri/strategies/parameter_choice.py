@@ -10,17 +10,17 @@ them the one with the largest σ of heights is taken. Blocks too small to be div
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import stdtrit
+from scipy.special import expit, stdtrit
 
 from aerotri.conventions import InputError, counted
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.observations import Block
 from aerotri.results.parameter_comparison import Choice, ParameterComparison, SetOutcome
-from aerotri.strategies.object_change import FarMoved, far_moved, frees_the_lens
+from aerotri.strategies.object_change import FarMoved, far_moved, frees_the_lens, movement
 
 RESAMPLES = 400
 """Bootstrap samples of the control points: the standard error from them is itself good to 1/√800, 3.5 % [D]; more
@@ -79,12 +79,23 @@ class Behind:
 
 
 @dataclass(frozen=True)
+class Rival:
+    """A set that cannot be told from the one taken, and the probability that it is the better one."""
+
+    choice: Choice
+    groups: str
+    kind: str
+    weight: float
+
+
+@dataclass(frozen=True)
 class Chosen:
     """The set to take, and why.
 
     Parameters
     ----------
     groups, kind : of values that change, as of `SetOutcome`.
+    rival : of the sets that cannot be told from it the one that makes the object most uncertain; None without one.
     """
 
     name: str
@@ -92,6 +103,7 @@ class Chosen:
     reason: str
     groups: str = ""
     kind: str = "free"
+    rival: Rival | None = None
 
 
 def sets_to_choose_from(block: Block) -> tuple[Choice, ...]:
@@ -137,6 +149,8 @@ def choose(comparison: ParameterComparison) -> Chosen:
     behind = distances(borne)
     if not behind:
         found = min(there, key=lambda o: (np.nan_to_num(o.bic, nan=np.inf), o.effective))
+        alike = [o for o in there if o.bic - found.bic <= NEGLIGIBLE]
+        rival = _rival(found, alike, lambda other: (found.bic - other.bic, 0.0))
         why = "the block is too small to predict one part by another: chosen by BIC alone"
         if not np.isfinite(found.bic):
             why = "the block has no redundancy that would tell one set from another: the one with fewest parameters"
@@ -147,9 +161,41 @@ def choose(comparison: ParameterComparison) -> Chosen:
         alike = [o for o in judged if behind[o.name].alike] or judged
         # without control no σ says which is the more cautious: the lens free, and little that could bend
         found = max(alike, key=lambda o: (np.nan_to_num(o.evidence.sigma_height), frees_the_lens(o), -o.effective))
+        rival = _rival(found, alike, lambda other: _between(found, other))
         reason = _reason(found, alike, behind)
     reason += f"; {counted(len(comparison.outcomes), 'set')} compared{_left_out(found, comparison, far)}"
-    return Chosen(found.name, found.choice, reason, found.groups, found.kind)
+    return Chosen(found.name, found.choice, reason, found.groups, found.kind, rival)
+
+
+def _rival(
+    found: SetOutcome, alike: Sequence[SetOutcome], between: Callable[[SetOutcome], tuple[float, float]]
+) -> Rival | None:
+    """Of the sets alike the one whose object would count most.
+
+    Parameters
+    ----------
+    between : difference of −2 ln of the densities of the set found and another, and its standard error.
+    """
+    others = [(o, probability_of_better(*between(o))) for o in alike if o is not found]
+    counts = [(weight * movement(found, o) ** 2, k) for k, (o, weight) in enumerate(others)]
+    known = [one for one in counts if np.isfinite(one[0])]
+    if not known:
+        return None
+    outcome, weight = others[max(known)[1]]
+    return Rival(outcome.choice, outcome.groups, outcome.kind, weight)
+
+
+def probability_of_better(value: float, error: float) -> float:
+    """That another set is the better one, both as likely beforehand.
+
+    [L] A difference Δ of −2 ln of the densities makes it 1/(1 + exp(−Δ/2)); of a Δ that is known with a standard error
+    s the mean of this is close to that with Δ/√(1 + π·s²/32) (MacKay 1992).
+
+    Parameters
+    ----------
+    value, error : −2 ln of the density of the set taken less that of the other, and its standard error.
+    """
+    return float(expit(0.5 * value / np.sqrt(1.0 + np.pi * error**2 / 32.0)))
 
 
 def _left_out(found: SetOutcome, comparison: ParameterComparison, far: dict[str, FarMoved]) -> str:

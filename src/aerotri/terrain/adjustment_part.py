@@ -26,7 +26,7 @@ from aerotri.deformation.restitution import Restitution
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, RayPartials, linearise
 from aerotri.rasters.between_places import between_places, lattice_of, spread_places
 from aerotri.results.adjustment import Adjustment
-from aerotri.statistics.camera_field import CameraField, is_of_camera
+from aerotri.statistics.camera_field import CameraField, model_beside_field
 from aerotri.statistics.covariance import inner_datum, is_inner
 from aerotri.statistics.image_sigma import weight_of_cameras
 from aerotri.statistics.model_of_functions import model_of_functions
@@ -246,6 +246,7 @@ def _covariances(
     frame, factor = places_of(calibration), factor or system.factorise(solution.equations)
     inner = inner_datum(system, solution.state, factor, solution.estimator) if is_inner(system) else None
     count = 6 * len(system.unknowns.images) + len(system.unknowns.shared)
+    root = calibration.model if left is None else model_beside_field(calibration)
     covariances = np.empty((len(local), size, size))
     for first in range(0, len(local), AT_A_TIME):
         part = slice(first, first + AT_A_TIME)
@@ -256,9 +257,9 @@ def _covariances(
         if inner is not None:
             both = both + inner.correction(by_columns, size)
         covariance = (calibration.local.outcome.sigma0 if left is None else left.noise) ** 2 * both
-        if calibration.model is not None and not (left is not None and is_of_camera(calibration)):
+        if root is not None:
             covariance = covariance + model_of_functions(
-                system, solution, calibration.model, by_columns, q, size, None if inner is None else both
+                system, solution, root, by_columns, q, size, None if inner is None else both
             )
         if left is not None:
             by_errors = by_errors + j @ left.by_unknowns

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aerotri.conventions import in_digits
+from aerotri.statistics.camera_field import known_field
 from aerotri.volume.bases import Base, PlaneBase, SplineBase, Surface, integral_of_spline, quadrature_of
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.drawn_edge import boundary_variance
@@ -255,12 +256,16 @@ def _one_adjustment(once: float) -> str:
 def _model_in_words(part: Part, parts: dict[str, float]) -> str:
     """Why σ is larger than the noise makes it."""
     found = part.calibration.local.model_part
-    change = "" if found is None else found.change
+    change, other = ("", None) if found is None else (found.change, found.other_set)
     noise, total = parts["adjustment"], np.hypot(parts["adjustment"], parts[MODEL])
-    why = (
-        f"the errors of the photographs change {change}, more than noise explains" if change
-        else "the residuals show image errors that the additional parameters leave"
-    )  # fmt: skip
+    reasons = []
+    if change:
+        reasons.append(f"the errors of the photographs change {change}, more than noise explains")
+    elif known_field(part.calibration) is not None:
+        reasons.append("the residuals show image errors that the additional parameters leave")
+    if other is not None and other.share > 0.0:
+        reasons.append(f"the image points cannot tell the additional parameters from {other.set}")
+    why = ", and ".join(reasons)
     if in_digits(total, 2) == in_digits(noise, 2):
         return f"{why}: with this model part the adjustment's share of σ stays {in_digits(total, 2)} m³"
     return (

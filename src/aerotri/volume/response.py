@@ -34,7 +34,7 @@ from aerotri.functional_model.additional_parameters.registry import INTERIOR_FAM
 from aerotri.functional_model.rotation import logarithm
 from aerotri.observations import Block
 from aerotri.results.adjustment import Adjustment
-from aerotri.statistics.camera_field import CameraField, is_of_camera, known_field, noise_beside_field
+from aerotri.statistics.camera_field import CameraField, known_field, model_beside_field, noise_beside_field
 from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE
 from aerotri.statistics.covariance import inner_datum, is_inner
 from aerotri.statistics.model_of_functions import model_of_functions
@@ -122,9 +122,9 @@ def respond_to_all(
     if is_inner(system):
         cofactor += inner_datum(system, solution.state, factor, solution.estimator).correction(c)[:, 0, 0]
     variance, model = noise_beside_field(calibration) ** 2 * cofactor, np.zeros(len(found))
-    if calibration.model is not None and not (known_field(calibration) is not None and is_of_camera(calibration)):
-        own = cofactor[:, None, None]
-        model = model_of_functions(system, solution, calibration.model, c, solved, 1, own)[:, 0, 0]
+    root = model_beside_field(calibration)
+    if root is not None:
+        model = model_of_functions(system, solution, root, c, solved, 1, cofactor[:, None, None])[:, 0, 0]
     return [
         replace(one, solved=solved[:, k].copy(), variance=float(variance[k]), model=one.model + float(model[k]))
         for k, one in enumerate(found)

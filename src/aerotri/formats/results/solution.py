@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +18,11 @@ from aerotri.adjustment.unknowns import Unknowns
 from aerotri.conventions import FilePath
 from aerotri.coordinates import LocalFrame
 from aerotri.formats.files.npz import Archive
-from aerotri.formats.results.json_text import json_text
+from aerotri.formats.results.json_text import json_text, number_or_none
 from aerotri.formats.results.solution_checks import SCHEMA, checked_values
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.model_part import OtherSet, SetDifference
 from aerotri.results.photograph_fields import PhotographFields
 from aerotri.results.position_errors import PositionErrors
 from aerotri.results.removal import Removal
@@ -47,6 +48,8 @@ class SavedSolution:
     verdict, reasons, notes : of the outcome; empty in results of versions that did not have them.
     position_errors, photograph_fields : what was said of the errors of positions and photographs as JSON, '' where
         there is nothing.
+    other_set : of the additional parameters that could not be told from those taken, as JSON, '' where there are none.
+    other_images : (n, 6), other_shared : (s,), other_points : (N, 3) m, what differs with them; None without any.
     """
 
     origin: np.ndarray
@@ -76,6 +79,17 @@ class SavedSolution:
     position_errors: str = ""
     photograph_fields: str = ""
     notes: tuple[str, ...] = ()
+    other_set: str = ""
+    other_images: np.ndarray | None = None
+    other_shared: np.ndarray | None = None
+    other_points: np.ndarray | None = None
+
+    def difference(self, unknowns: Unknowns) -> SetDifference | None:
+        """What another set of additional parameters would change; None where there is none."""
+        if self.other_images is None or self.other_shared is None or self.other_points is None:
+            return None
+        other, u = OtherSet.from_dict(json.loads(self.other_set)), unknowns
+        return SetDifference(other, self.other_images[u.images], self.other_shared, self.other_points[u.points])
 
     def removal_records(self) -> tuple[Removal, ...]:
         """The parameters that the selection took out."""
@@ -100,12 +114,14 @@ def write_solution(
     solution: Solution,
     result: AdjustedBlock,
     frame: LocalFrame | None = None,
+    other: SetDifference | None = None,
 ) -> None:
     """Write solution.npz.
 
     Parameters
     ----------
     result : in the frame of `system`. frame : the local frame of a block with a CRS.
+    other : what another set of additional parameters would change; None where there is none.
     """
     u, state = system.unknowns, solution.state
     n, count = len(u.block.images), len(u.block.points)
@@ -144,7 +160,23 @@ def write_solution(
             "" if result.photograph_fields is None else json_text(result.photograph_fields.as_dict())
         ),
         components=np.array("" if result.components is None else json_text(result.components.as_dict())),
+        allow_pickle=False,
+        **_other_set(u, other),
     )
+
+
+def _other_set(unknowns: Unknowns, difference: SetDifference | None) -> dict[str, np.ndarray]:
+    """The entries of another set of parameters, rows as in the block, 0 of what is not adjusted."""
+    if difference is None:
+        return {}
+    images = np.zeros((len(unknowns.block.images), 6))
+    points = np.zeros((len(unknowns.block.points), 3))
+    images[unknowns.images], points[unknowns.points] = difference.images, difference.points
+    told = {key: number_or_none(v) if key != "set" else v for key, v in asdict(difference.other).items()}
+    return {
+        "other_set": np.array(json_text(told)), "other_images": images, "other_shared": difference.shared,
+        "other_points": points,
+    }  # fmt: skip
 
 
 def _shared_cofactor(unknowns: Unknowns, result: AdjustedBlock) -> np.ndarray:

@@ -14,6 +14,7 @@ from aerotri.adjustment.ray_status import RAY_STATUS
 from aerotri.adjustment.robust import CODES, WIDEST
 from aerotri.formats.files.npz import Archive, Shape
 from aerotri.observations import Block
+from aerotri.results.model_part import OtherSet
 from aerotri.results.photograph_fields import PhotographFields
 from aerotri.results.position_errors import PositionErrors
 from aerotri.results.removal import Removal
@@ -23,6 +24,8 @@ SCHEMA = 1
 """Version of the archive; it grows when an array changes its meaning, and others are refused."""
 STATUS = ("converged", "not converged", "rank deficient")
 VERDICTS = ("", "accepted", "doubtful", "rejected")
+OF_OTHER_SET = ("other_images", "other_shared", "other_points")
+"""Arrays that are there beside the text 'other_set'."""
 SQUARE = 1e-6
 """Largest deviation of RᵀR from the unit matrix in a rotation written with all its digits."""
 LARGEST = 1e15
@@ -34,7 +37,7 @@ such, a step of `FARTHEST` at most at a time."""
 SCALARS = {"estimator_code": "iu", "estimator_limit": "f", "sigma0": "f", "iterations": "iu", "status": "U"} | {
     "geoid": "U", "components": "U", "removals": "U",
 }  # fmt: skip
-LATER = {"verdict": "U", "position_errors": "U", "photograph_fields": "U"}
+LATER = {"verdict": "U", "position_errors": "U", "photograph_fields": "U", "other_set": "U"}
 """Texts that results of older versions do not have, '' there."""
 
 
@@ -86,6 +89,12 @@ def _arrays(archive: Archive, block: Block | None) -> dict[str, np.ndarray]:
         "ray_status": ("iu", (m,)),
         "weight": ("f", (m,)),
     }
+    if "other_set" in archive.members:
+        others |= {
+            "other_images": ("f", (len(centre), 6)),
+            "other_shared": ("f", (s,)),
+            "other_points": ("f", (len(points), 3)),
+        }
     found = {"centre": centre, "points": points, "xy": xy, "shared": shared}
     return found | {name: archive.array(name, kind, shape) for name, (kind, shape) in others.items()}
 
@@ -129,6 +138,10 @@ def _check_arrays(archive: Archive, values: dict[str, Any]) -> None:
         (bool(np.isnan(frame).all()) or _is_bounded(frame), "its local frame has no origin"),
         (values["shared_names"].dtype.kind == "U" or not len(values["shared"]), "its parameters have no names"),
         (values["shared_groups"].dtype.kind == "U" or not len(values["shared"]), "its parameters have no groups"),
+        (
+            all(_is_bounded(values[name]) for name in OF_OTHER_SET if name in values),
+            "what another set of parameters changes is not finite",
+        ),
     ):
         if not good:
             raise archive.error(f"holds no solution: {what}")
@@ -159,6 +172,10 @@ def _check_json(archive: Archive, values: dict[str, Any]) -> None:
         errors = _json(archive, "position_errors", values["position_errors"])
         if not _is_record(errors, PositionErrors):
             raise archive.error("holds no record of the errors of positions")
+    if values["other_set"]:
+        other = _json(archive, "other_set", values["other_set"])
+        if not _is_record(other, OtherSet) or not all(0.0 <= other[key] <= 1.0 for key in ("weight", "unexplained")):
+            raise archive.error("holds no record of another set of parameters")
     if values["photograph_fields"]:
         fields = _json(archive, "photograph_fields", values["photograph_fields"])
         if not _is_record(fields, PhotographFields):
