@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.formats.block.folder import read_block, write_block
 from aerotri.formats.results.solution import read_solution, write_solution
 from aerotri.functional_model.additional_parameters import collocation, parameter_set, parse_parameters
@@ -17,7 +18,7 @@ from aerotri.observations import Block, CollocationSettings, Prior
 from aerotri.pipeline import adjust_keeping_system, reopen
 from aerotri.simulation import parse_spec, simulate
 from aerotri.statistics.summarise import inseparable
-from aerotri.strategies.field_estimation import FieldCovariance, ReducedToFields
+from aerotri.strategies.field_estimation import FieldCovariance, ReducedToFields, border_marginal
 from dense_algebra import TINY, dense_design
 from small_blocks import small_block, small_spec, with_adjustment
 
@@ -222,3 +223,29 @@ def test_what_is_given_is_kept_and_a_result_reopens(tmp_path):
         again.result.parameters.covariance / np.outer(scale, scale),
         a.result.parameters.covariance / np.outer(scale, scale), atol=1e-9,
     )  # fmt: skip
+
+
+class OfCofactors:
+    """A factor that knows its cofactors well and has lost its normal equations to rounding."""
+
+    def __init__(self, cofactors, normals):
+        self._cofactors, self._normals = cofactors, normals
+
+    def border_inverse(self):
+        return self._cofactors
+
+    def border_normals(self):
+        return self._normals
+
+
+def test_normals_lost_to_rounding_come_from_cofactors():
+    """Found with a flight that positions of 5 m hold: marginal normals are the inverse of a part of the cofactors."""
+    root = np.random.default_rng(1).normal(size=(9, 5)) * [1.0, 1e-6, 1.0, 1e4, 1.0]
+    normals = root.T @ root
+    cofactors, columns = np.linalg.inv(normals), np.array([0, 2, 3])
+    lost = normals - np.diag([0.0, 2.0 * normals[1, 1], 0.0, 0.0, 0.0])
+    found = border_marginal(OfCofactors(cofactors, lost), columns)
+    np.testing.assert_allclose(found, border_marginal(OfCofactors(cofactors, normals), columns), rtol=1e-6)
+    for bad in (-cofactors, np.full_like(cofactors, np.nan)):
+        with pytest.raises(NotPositiveDefiniteError):
+            border_marginal(OfCofactors(bad, lost), columns)

@@ -146,15 +146,39 @@ def with_estimated_fields(
 
 
 def border_marginal(factor: Factor, columns: np.ndarray) -> np.ndarray:
-    """(k, k) normals of some shared parameters, photographs, points and the other shared parameters eliminated."""
+    """(k, k) normals of some shared parameters, photographs, points and the other shared parameters eliminated.
+
+    Raises
+    ------
+    NotPositiveDefiniteError
+        Where rounding has left no digit of them.
+    """
     normals = factor.border_normals()
     others = np.setdiff1d(np.arange(len(normals)), columns)
     own = normals[np.ix_(columns, columns)]
     if not len(others):
         return own
-    lower = np.linalg.cholesky(normals[np.ix_(others, others)])
+    try:
+        lower = np.linalg.cholesky(normals[np.ix_(others, others)])
+    except np.linalg.LinAlgError:
+        # equations that hardly hold a block have kept their digits in the cofactors
+        return _inverse(factor.border_inverse()[np.ix_(columns, columns)])
     mixed = solve_triangular(lower, normals[np.ix_(others, columns)], lower=True)
     return own - mixed.T @ mixed
+
+
+def _inverse(cofactors: np.ndarray) -> np.ndarray:
+    """Of a positive definite matrix."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scale = 1.0 / np.sqrt(np.diagonal(cofactors))
+    scaled = cofactors * np.outer(scale, scale)
+    try:
+        if not np.isfinite(scaled).all():
+            raise NotPositiveDefiniteError
+        root = solve_triangular(np.linalg.cholesky(scaled), np.eye(len(scaled)), lower=True)
+    except np.linalg.LinAlgError as error:
+        raise NotPositiveDefiniteError from error
+    return root.T @ root * np.outer(scale, scale)
 
 
 def estimate_covariance(

@@ -76,8 +76,11 @@ def predict_groups(
     """
     kinds = np.array(system.unknowns.shared.kinds, dtype=object)
     columns = np.flatnonzero(~np.isin(kinds.astype(str), OF_POINTS))
-    normals = border_marginal(factor, columns)
     deviance, redundancy = np.full(len(groups), np.nan), np.full(len(groups), np.nan)
+    try:
+        normals = border_marginal(factor, columns)
+    except NotPositiveDefiniteError:
+        return GroupPrediction(deviance, redundancy)
     for number, images in enumerate(groups):
         said = _said(system, solution, status, images, columns, np.diagonal(normals))
         if said is None:

@@ -30,7 +30,7 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.parallel import blas_threads
 from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.solve import Solution, SolveOptions
-from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import State, Unknowns
 from aerotri.conventions import InputError
@@ -132,7 +132,10 @@ class SetComparer:
             # the same points and divisions for every set
             self._divisions = divisions_of(system.unknowns, state)
             self._names = _check_points(system.unknowns), _control_points(system.unknowns)
-        return self._adjusted(system, state, candidate)
+        try:
+            return self._adjusted(system, state, candidate)
+        except NotPositiveDefiniteError:
+            return _failed(candidate, "rank deficient: rounding has left no digit of the normal equations"), None
 
     def comparison(self, outcomes: Sequence[SetOutcome]) -> ParameterComparison:
         """Outcomes together, with what they have in common."""
