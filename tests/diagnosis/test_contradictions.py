@@ -7,9 +7,10 @@ import pytest
 
 import aerotri
 from aerotri.diagnosis import findings
+from aerotri.diagnosis.common_motion import of_common_motion
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.pipeline import adjust_keeping_system
-from aerotri.results.common_motion import CHANCE
+from aerotri.results.common_motion import CHANCE, SUSPECTED
 from aerotri.results.control_heights import BOWL, NAMES, SPLIT
 from aerotri.statistics.control_heights import control_heights
 from dense_algebra import TINY
@@ -94,6 +95,24 @@ def test_what_control_alone_cannot_show():
     assert len(notes) == 1
     assert "height of the pole" in notes[0].says
     assert notes[0].grade == "accepted"
+
+
+def test_what_control_and_gnss_cannot_show():
+    """A tilt that is too small to count is told as what may stay hidden, and one that is large counts."""
+    found = adjust_keeping_system(block_with_gnss()).local
+    motion = found.common_motion
+    note = next(f for f in findings(found) if f.quantity == "what this block cannot show")
+    assert "map grid" in note.says
+    assert f"a tilt of all control points against GNSS below {motion.detectable_tilt_m:.2g} m" in note.says
+    assert 3.0 < motion.detectable_tilt_m / motion.tilt_m[1] < 5.0
+    assert motion.detectable_tilt_m < 2.0
+
+
+def test_a_tilt_that_may_be_chance_is_told_without_a_doubt():
+    found = adjust_keeping_system(block_with_gnss()).local
+    motion = replace(found.common_motion, p_tilt=0.5 * (CHANCE + SUSPECTED))
+    said = [f for f in of_common_motion(replace(found, common_motion=motion)) if "tilted by" in f.says]
+    assert [(f.level, f.grade) for f in said] == [("attention", "accepted")]
 
 
 SMALL = TINY | {"control": {"distance_bases": 2.0, "sigma_m": [0.03, 0.03, 0.05], "check_points": 8}}

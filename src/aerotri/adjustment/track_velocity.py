@@ -220,3 +220,35 @@ def _along(block: Block, images: np.ndarray, centre: np.ndarray, strip: np.ndarr
             way = np.gradient(centre[order], axis=0)
             out[order] = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
     return out
+
+
+def strip_velocities(block: Block, images: np.ndarray, centre: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """(n, 3) velocities of the strips of photographs in units of the usual one; 0 of a photograph alone.
+
+    By the times of a strip where it has them all, else by its base an exposure.
+
+    Parameters
+    ----------
+    images : (n,) rows of the block. centre : (n, 3) m. wanted : (n,) bool.
+    """
+    time, velocity = times_of(block)[images], np.zeros((len(images), 3))
+    timed = bool(np.isfinite(time[wanted]).all())
+    for own in _passes(block, images, wanted):
+        strips = _strips(block, images[own], centre[own], time[own])
+        for one in np.unique(strips):
+            rows = own[strips == one]
+            velocity[rows] = _mean_velocity(centre[rows], time[rows], block.images.names[images[rows]], timed)
+    speed = np.linalg.norm(velocity, axis=1)
+    usual = float(np.median(speed[speed > 0.0])) if (speed > 0.0).any() else 1.0
+    return velocity / usual
+
+
+def _mean_velocity(centre: np.ndarray, time: np.ndarray, names: np.ndarray, timed: bool) -> np.ndarray:
+    """(3,) slope of positions over times, or over the number of the exposure; 0 where there is none."""
+    if not timed:
+        order = order_of_exposure(centre, np.full(len(centre), ""), names, np.full(len(centre), np.nan))
+        time = np.empty(len(centre))
+        time[order] = np.arange(len(centre))
+    since = time - time.mean()
+    length = float(since @ since)
+    return since @ (centre - centre.mean(axis=0)) / length if length > 0.0 else np.zeros(3)

@@ -6,7 +6,7 @@ import numpy as np
 
 from aerotri.diagnosis.finding import Finding, doubt
 from aerotri.results.adjusted_block import AdjustedBlock
-from aerotri.results.common_motion import CHANCE, CommonMotion
+from aerotri.results.common_motion import CHANCE, SUSPECTED, CommonMotion
 
 CAUSES_OF_TILT = "heights of the control points that are wrong along one direction, or another datum of the GNSS"
 CAUSES_OF_TURN = "control points and GNSS in different grids, or a wrong time of the exposures"
@@ -14,6 +14,7 @@ CAUSES_OF_SCALE = (
     "distances of the map grid taken for distances on the ground, or the other way round; another ellipsoid or unit; "
     "a principal distance that is held at a wrong value"
 )
+NO_DOUBT = "One faultless block in a hundred shows as much, so it does not count in the verdict: compare check points"
 
 
 def of_common_motion(adjusted: AdjustedBlock) -> list[Finding]:
@@ -22,33 +23,36 @@ def of_common_motion(adjusted: AdjustedBlock) -> list[Finding]:
     if found is None:
         return []
     said = common_motion_in_words(found)
-    if not said:
-        return [Finding("turn and scale of GNSS", _scale(found), "0 within σ", "GNSS and the rest agree", "good")]
     name, expected = "turn and scale of GNSS", "0 within σ"
+    if not said:
+        suspected = common_motion_in_words(found, SUSPECTED)
+        if suspected:
+            return [Finding(name, _scale(found), expected, f"{text}. {NO_DOUBT}", "attention") for text in suspected]
+        return [Finding(name, _scale(found), expected, "GNSS and the rest agree", "good")]
     if adjusted.position_errors is not None and adjusted.position_errors.neighbours_agree:
         # errors of GNSS that stay for a while look like a turn of all: they are told by themselves
         return [Finding(name, _scale(found), expected, text, "attention") for text in said]
     return [finding for text in said for finding in doubt(name, _scale(found), expected, "doubtful", text)]
 
 
-def common_motion_in_words(found: CommonMotion | None) -> list[str]:
-    """What contradicts what, a sentence each; none where chance explains it."""
-    if found is None or not found.counts:
+def common_motion_in_words(found: CommonMotion | None, chance: float = CHANCE) -> list[str]:
+    """What contradicts what, a sentence each; none where chance explains it with this probability or more."""
+    if found is None:
         return []
     said = []
-    if found.p_tilt < CHANCE:
-        height = float(np.hypot(found.turn[0] * found.extent[1], found.turn[1] * found.extent[0]))
+    if found.p_tilt < chance:
         said.append(
-            f"control points and GNSS contradict each other: the GNSS positions are tilted by {height:.3f} m in height "
+            "control points and GNSS contradict each other: the GNSS positions are tilted by "
+            f"{found.tilt_m[0]:.3f} m (σ {found.tilt_m[1]:.3f}) in height "
             f"over the length of the block ({_chance(found.p_tilt)}). Possible causes: {CAUSES_OF_TILT}"
         )
-    if found.p_turn < CHANCE:
+    if found.p_turn < chance:
         across = abs(float(found.turn[2])) * float(np.hypot(*found.extent[:2]))
         said.append(
             f"control points and GNSS contradict each other: the GNSS positions are turned in plan by {across:.3f} m "
             f"over the length of the block ({_chance(found.p_turn)}). Possible causes: {CAUSES_OF_TURN}"
         )
-    if found.p_scale < CHANCE:
+    if found.p_scale < chance:
         said.append(
             f"GNSS contradicts control points and photographs in scale: {_scale(found)} "
             f"({_chance(found.p_scale)}). Possible causes: {CAUSES_OF_SCALE}"

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerotri import of_known
 from aerotri.diagnosis.finding import Finding
 from aerotri.results.adjusted_block import AdjustedBlock
 
 FREE = ("estimated", "weighted")
+WORTH_SAYING = 4.0
+"""σ of the object points, total, from which an error that may stay hidden is told [C]: it would be a gross error."""
 
 
 def of_control(adjusted: AdjustedBlock) -> list[Finding]:
@@ -51,13 +54,39 @@ def what_is_hidden(adjusted: AdjustedBlock) -> list[str]:
         hidden = ["an error that all positions share: a wrong base station, another datum, a wrong geoid"]
         if free_c:
             hidden.append("a shift of all heights: the free principal distance absorbs it")
-    elif positions and (free_c or _shift_is_free(adjusted)):
+    elif positions:
         hidden = [
-            "an error in height that all control points share, such as a wrong height of the pole: "
-            + ("the principal distance" if free_c else "the shift of the GNSS positions")
-            + " absorbs it, against the heights of GNSS"
+            "an error that control points and GNSS share: one wrong base point for both, distances of the map grid "
+            "taken for distances on the ground in both"
         ]
+        if free_c or _shift_is_free(adjusted):
+            hidden.append(
+                "an error in height that all control points share, such as a wrong height of the pole: "
+                + ("the principal distance" if free_c else "the shift of the GNSS positions")
+                + " absorbs it, against the heights of GNSS"
+            )
+        hidden += _below_detection(adjusted)
     return hidden
+
+
+def _below_detection(adjusted: AdjustedBlock) -> list[str]:
+    """Errors of all control points that are large beside σ, and too small for the contradiction with GNSS to count."""
+    motion, sigma = adjusted.common_motion, adjusted.points.total_sigma
+    if motion is None:
+        return []
+    plan, height = of_known.median(np.hypot(sigma[:, 0], sigma[:, 1])), of_known.median(sigma[:, 2])
+    length, found = float(np.hypot(*motion.extent[:2])), []
+    if motion.detectable_tilt_m > WORTH_SAYING * height:
+        found.append(
+            f"a tilt of all control points against GNSS below {motion.detectable_tilt_m:.2g} m over the length of the "
+            "block"
+        )
+    if motion.detectable_scale * length > WORTH_SAYING * plan:
+        found.append(
+            f"a difference of scale of control points and GNSS below {1e6 * motion.detectable_scale:.0f} ppm, "
+            f"{motion.detectable_scale * length:.2g} m over {length:.0f} m"
+        )
+    return found
 
 
 def _has_positions(adjusted: AdjustedBlock) -> bool:

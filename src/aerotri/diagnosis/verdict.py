@@ -22,6 +22,7 @@ from aerotri.diagnosis import (
     photograph_fields,
     position_errors,
     rigidity,
+    unmodelled_shutter,
 )
 from aerotri.diagnosis.finding import GRADES, Finding, Grade
 from aerotri.results.adjusted_block import AdjustedBlock
@@ -42,6 +43,7 @@ RULES: tuple[Rule, ...] = (
     control_digits.of_digits,
     control_heights.of_heights,
     control_limits.of_control,
+    unmodelled_shutter.of_unmodelled_shutter,
     position_errors.of_positions,
     neighbouring_rays.of_neighbouring_rays,
     photograph_fields.of_photograph_fields,

@@ -10,12 +10,14 @@ from aerotri.coordinates.blocks import frame_of_block
 from aerotri.diagnosis import diagnose, judge
 from aerotri.diagnosis.check_points import in_doubt
 from aerotri.diagnosis.control_heights import stand_out
+from aerotri.diagnosis.fit import NO_FIT
 from aerotri.diagnosis.purpose import purpose
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock, Outcome
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.check_freedom import check_freedom
 from aerotri.statistics.control_heights import control_heights
+from aerotri.statistics.unmodelled_shutter import unmodelled_shutter
 
 
 def judged(found: Adjustment) -> Adjustment:
@@ -27,7 +29,16 @@ def judged(found: Adjustment) -> Adjustment:
 
 
 def with_evidence(found: Adjustment) -> Adjustment:
-    """The adjustment with what takes time to compute and is asked for only where the numbers leave a doubt."""
+    """The adjustment with what takes time to compute: a test for a rolling shutter, and what doubts ask for."""
+    if found.solution.status == "converged" and found.local.outcome.sigma0 < NO_FIT:
+        shutter = unmodelled_shutter(found.system, found.solution, found.local)
+        local = replace(found.local, unmodelled_shutter=shutter)
+        found = replace(found, local=local, result=local if found.frame is None else found.result)
+    return _with_doubts(found)
+
+
+def _with_doubts(found: Adjustment) -> Adjustment:
+    """The adjustment with tests of check points and of heights of control that stand out."""
     local, system, solution = found.local, found.system, found.solution
     if local.block.settings.adjustment.datum != "control" or solution.status != "converged":
         return found

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from aerotri.results.rigidity import Rigidity
     from aerotri.results.rigs import MountedCamera, RigMovements
     from aerotri.results.rolling_shutter import RollingShutters
+    from aerotri.results.unmodelled_shutter import UnmodelledShutter
     from aerotri.results.variance_components import VarianceComponents
 
 
@@ -345,6 +346,7 @@ class AdjustedBlock:
     are shifted against the control points, `common_motion` what they are turned and scaled,
     `photograph_fields` how much photographs have smooth errors of their own, `relative` the σ of the shape of the
     block, `control_heights` how the heights of all control points together fit; None where none of them stands out.
+    `unmodelled_shutter` is what the photographs say of a rolling shutter that no camera states.
     """
 
     block: Block
@@ -374,6 +376,7 @@ class AdjustedBlock:
     relative: RelativePrecision | None = None
     common_motion: CommonMotion | None = None
     control_heights: ControlHeights | None = None
+    unmodelled_shutter: UnmodelledShutter | None = None
 
 
 def head_of(adjusted: AdjustedBlock) -> Head:

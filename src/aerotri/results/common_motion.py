@@ -6,8 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.quantiles import noncentrality
+
 CHANCE = 3e-4
 """Probability of a turn or a scale by chance below which it counts: a third of 0.1 % for each of the three tests."""
+
+SUSPECTED = 1e-2
+"""The same below which it is told without a doubt of the result [C]: three blocks in a hundred have one by chance."""
+POWER = 0.8
+"""Probability with which a motion of the detectable size is found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,3 +41,23 @@ class CommonMotion:
     def counts(self) -> bool:
         """Whether chance does not explain it."""
         return min(self.p_tilt, self.p_turn, self.p_scale) < CHANCE
+
+    @property
+    def tilt_m(self) -> tuple[float, float]:
+        """Difference in height over the length of the block by the tilt, m, and its σ."""
+        tilt, sigma = (float(np.hypot(of[0] * self.extent[1], of[1] * self.extent[0])) for of in self._turns)
+        return tilt, sigma
+
+    @property
+    def detectable_tilt_m(self) -> float:
+        """The tilt, as `tilt_m`, that counts with a probability of POWER."""
+        return float(np.sqrt(noncentrality(2.0, CHANCE, POWER) / 2.0)) * self.tilt_m[1]
+
+    @property
+    def detectable_scale(self) -> float:
+        """The scale that counts with a probability of POWER."""
+        return float(np.sqrt(noncentrality(1.0, CHANCE, POWER))) * self.scale_sigma
+
+    @property
+    def _turns(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.turn, self.turn_sigma
