@@ -398,7 +398,10 @@ HARMLESS = ("accepted", "doubtful", "rejected")
 
 def kinds() -> list[Kind]:
     """All kinds."""
-    return [*_of_measurements(), *_of_control(), *_of_navigation(), *_of_start_values(), *_of_the_camera()]
+    return [
+        *_of_measurements(), *_of_control(), *_of_navigation(), *_of_start_values(), *_of_the_camera(),
+        *_that_fit_alone(),
+    ]  # fmt: skip
 
 
 def _of_measurements() -> list[Kind]:
@@ -485,6 +488,103 @@ def _of_control() -> list[Kind]:
         Kind("check points, X and Y exchanged", "track", ground(exchanged), ("X and Y exchanged",), EITHER),
         Kind("one check point 10 m off", "control", _check_off(10.0), ("off by",), EITHER),
     ]
+    return found
+
+
+def in_plan(factor: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Coordinates in another scale in plan about their middle."""
+
+    def change(xyz: np.ndarray) -> np.ndarray:
+        return xyz + (factor - 1.0) * (xyz - xyz.mean(axis=0)) * [1.0, 1.0, 0.0]
+
+    return change
+
+
+def turned_in_plan(angle: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Coordinates turned by a small angle, rad, about their middle."""
+
+    def change(xyz: np.ndarray) -> np.ndarray:
+        off = xyz - xyz.mean(axis=0)
+        return xyz + angle * np.column_stack([-off[:, 1], off[:, 0], 0.0 * off[:, 0]])
+
+    return change
+
+
+def tilted(metres: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Heights that rise by so much from the smallest X to the largest."""
+
+    def change(xyz: np.ndarray) -> np.ndarray:
+        rise = (xyz[:, 0] - xyz[:, 0].min()) / np.ptp(xyz[:, 0])
+        return xyz + metres * rise[:, None] * [0.0, 0.0, 1.0]
+
+    return change
+
+
+def bent(metres: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Heights that rise from the middle to the outermost point, as if the Earth's curvature were left out."""
+
+    def change(xyz: np.ndarray) -> np.ndarray:
+        off = np.linalg.norm((xyz - xyz.mean(axis=0))[:, :2], axis=1)
+        return xyz + metres * ((off / off.max()) ** 2)[:, None] * [0.0, 0.0, 1.0]
+
+    return change
+
+
+def every_second(metres: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Every second height higher, as with another pole."""
+    return lambda xyz: xyz + metres * (np.arange(len(xyz)) % 2 == 0)[:, None] * [0.0, 0.0, 1.0]
+
+
+def rounded(step: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Coordinates with too few digits."""
+    return lambda xyz: np.round(xyz / step) * step
+
+
+def rolling_shutter(way: float) -> Spoil:
+    """Image points of a camera that moves by so many metres while its rows are read from the top to the bottom."""
+
+    def spoil(block: Block) -> Block:
+        rays, images, gnss = block.image_points, block.images, block.gnss_ins
+        strip, centre = np.asarray(images.strip), np.full((len(images), 3), np.nan)
+        centre[gnss.image] = gnss.xyz
+        flight = np.zeros_like(centre)
+        for name in np.unique(strip):
+            rows = np.flatnonzero(strip == name)
+            flight[rows] = (centre[rows[-1]] - centre[rows[0]]) / np.linalg.norm(centre[rows[-1]] - centre[rows[0]])
+        moving = np.einsum("nji,nj->ni", rotation_from_angles(images.angles, block.rotation), flight)[rays.image]
+        camera = block.cameras[0]
+        above = np.mean(centre[:, 2]) - np.mean(block.control.xyz[:, 2])
+        since = -rays.xy[:, 1:] / (2.0 * camera.half_format_mm[1])
+        xy = rays.xy - way * since * camera.focal_length_mm / above * moving[:, :2]
+        return replace(block, image_points=replace(rays, xy=xy))
+
+    return spoil
+
+
+def _that_fit_alone() -> list[Kind]:
+    """Errors that all of a set share: every set fits by itself, and its residuals are small."""
+    found = [
+        Kind(
+            "heights of the control tilted by 1 m, no INS",
+            "navigation",
+            both(ins(times(np.nan)), ground(tilted(1.0))),
+            ("tilted by",),
+            EITHER,
+        ),
+        Kind("control in distances of a grid, 1000 ppm", "navigation", ground(in_plan(0.999)), ("in scale",), EITHER),
+        Kind("control turned by 1 mrad", "navigation", ground(turned_in_plan(1e-3)), ("turned in plan",), EITHER),
+        Kind("GNSS in distances of a grid, 1000 ppm", "navigation", gnss(in_plan(0.999)), ("in scale",), EITHER),
+        Kind(
+            "rolling shutter of 0.3 m", "navigation", rolling_shutter(0.3), ("as by a rolling shutter", "cam"), EITHER
+        ),
+    ]
+    for geometry in ("navigation", "control"):
+        found += [
+            Kind("control rounded to metres", geometry, control_points(rounded(1.0)), ("are rounded to",), EITHER),
+            Kind("heights of the control bent by 2 m", geometry, control_points(bent(2.0)), ("like a bowl",), EITHER),
+            Kind("every second control point 0.8 m too high", geometry, control_points(every_second(0.8)),
+                 ("fall into two groups",), EITHER),
+        ]  # fmt: skip
     return found
 
 

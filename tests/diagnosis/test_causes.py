@@ -34,6 +34,7 @@ FEW = (
     ("navigation", "focal length a tenth"),
     ("control", "strips without a common point"),
     ("track", "X and Y of GNSS exchanged"),
+    ("navigation", "rolling shutter of 0.3 m"),
 )
 """Kinds that run in the tests; tools/prove/wrong_blocks.py runs all of them."""
 
