@@ -120,6 +120,11 @@ def test_saved_and_opened(both, tmp_path):
     content = json.loads((tmp_path / "out" / "adjustment.json").read_text(encoding="utf-8"))
     assert content["model_part"]["other_set"]["set"] == BLUH
     assert opened.adjusted.model_part.other_set == result.adjusted.model_part.other_set
+    saved = dict(np.load(tmp_path / "out" / "solution.npz"))
+    for damaged in ({"other_set": np.array('{"set": "none"}')}, {"other_points": saved["other_points"] * np.nan}):
+        np.savez(tmp_path / "out" / "solution.npz", **(saved | damaged))
+        with pytest.raises(aerotri.InputError):
+            aerotri.open_result(tmp_path / "out")
 
 
 def test_it_is_told(both):

@@ -4,6 +4,7 @@ Simulated flights of 40 photographs (five strips and a cross strip, 80/60 %) who
 contains, and that change: six kinds of errors, four layouts of control. Every block is adjusted as `aerotri adjust`
 does it without `additional_parameters`, and with fixed sets. Check points: mean over the blocks of (error/σ)², with the
 total σ and with that of the noise; its standard error from the scatter of the blocks; and the RMS of the height errors.
+Of the default there is a line without what a set that predicts as well adds to total σ.
 Last, a camera whose errors are a known set: the σ of the default over those of that set, and how often movement is
 found.
 
@@ -26,6 +27,8 @@ from aerotri import observations
 from runs_elsewhere import add_executor, runs_of
 
 SETS = ("auto", "none", "brown:K1+K2+K3+P1+P2", "bluh:1-12", "legendre:5x5")
+ALONE = "auto, σ of the set taken alone"
+"""Without what a set that predicts as well adds to total σ."""
 HALF = (17.5, 11.66)
 """Half width and half height of the photographs, mm."""
 SIZE_UM = 2.0
@@ -127,7 +130,7 @@ def held(block: observations.Block, layout: str) -> observations.Block:
 @dataclass(frozen=True)
 class Found:
     """Of one block and set: mean (error/σ)² of plan and height with total σ and with that of the noise, squares of the
-    errors, mean σ of heights, the set, whether it moves."""
+    errors, mean σ of heights, the set, whether it moves, and the first with total σ of the set taken alone."""
 
     total: tuple[float, float]
     noise: tuple[float, float]
@@ -135,6 +138,7 @@ class Found:
     sigma_height: float
     chosen: str
     moves: bool
+    alone: tuple[float, float]
 
 
 def adjusted(block: observations.Block, spec: str) -> Found | str:
@@ -147,12 +151,23 @@ def adjusted(block: observations.Block, spec: str) -> Found | str:
     known = np.array([given[int(point)] for point in check.point])
     seen = np.isfinite(check.difference).all(axis=1)
     d, s = check.difference[seen], own.control.sigma[known][seen]
-    squares = [d**2 / (sigma[seen] ** 2 + s**2) for sigma in (check.total_sigma, check.sigma)]
+    total = check.total_sigma[seen] ** 2
+    alone = total - of_other_set(result)[check.point[seen]]
+    squares = [d**2 / (variance + s**2) for variance in (total, check.sigma[seen] ** 2, alone)]
     of_axes = [(float(z[:, :2].mean()), float(z[:, 2].mean())) for z in squares]
     settings = own.settings.adjustment
     chosen = ",".join(family for family, _ in settings.additional_parameters) or "none"
     height, sigma = float(np.mean(d[:, 2] ** 2)), float(np.mean(check.total_sigma[seen, 2]))
-    return Found(of_axes[0], of_axes[1], height, sigma, chosen, settings.parameter_groups == "strip")
+    moves = settings.parameter_groups == "strip"
+    return Found(of_axes[0], of_axes[1], height, sigma, chosen, moves, of_axes[2])
+
+
+def of_other_set(result: aerotri.Adjustment) -> np.ndarray:
+    """(N, 3) m², what a set that predicts as well adds to the variances of the points."""
+    found, variance = result.record.other, np.zeros((len(result.adjusted.block.points), 3))
+    if found is not None:
+        variance[result.record.system.unknowns.points] = found.other.share * found.points**2
+    return variance
 
 
 def simulated(seed: int, kind: str, layout: str) -> observations.Block:
@@ -190,9 +205,9 @@ def cell(values: list[float]) -> str:
     return f"{np.mean(values):.2f} ± {np.std(values, ddof=1) / np.sqrt(len(values)):.2f}" if len(values) > 1 else "–"
 
 
-def line(title: str, spec: str, found: list[Found | str]) -> str:
+def line(title: str, spec: str, found: list[Found | str], total: str = "total") -> str:
     there = [one for one in found if not isinstance(one, str)]
-    cells = [cell([getattr(one, which)[k] for one in there]) for which in ("total", "noise") for k in range(2)]
+    cells = [cell([getattr(one, which)[k] for one in there]) for which in (total, "noise") for k in range(2)]
     rms = f"{100 * np.sqrt(np.mean([one.height_m2 for one in there])):.1f}" if there else "–"
     return f"| {title} | {spec} | {len(there)} of {len(found)} | {' | '.join(cells)} | {rms} |"
 
@@ -220,9 +235,14 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|")
     for spec in SETS:
         print(line("all", spec, [one[spec] for one in of_unknown]))
+        if spec == "auto":
+            print(line("all", ALONE, [one[spec] for one in of_unknown], "alone"))
     for title, at in (*((kind, 1) for kind in KINDS), *((layout, 2) for layout in LAYOUTS)):
         for spec in SETS[:3]:
-            print(line(title, spec, [one[spec] for one, job in zip(of_unknown, jobs, strict=True) if job[at] == title]))
+            own = [one[spec] for one, job in zip(of_unknown, jobs, strict=True) if job[at] == title]
+            print(line(title, spec, own))
+            if spec == "auto":
+                print(line(title, ALONE, own, "alone"))
     chosen: dict[str, Counter[str]] = defaultdict(Counter)
     for one, job in zip(of_unknown, jobs, strict=True):
         auto = one["auto"]

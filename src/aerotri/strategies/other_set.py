@@ -69,6 +69,8 @@ def set_difference(
         if other is None:
             return None
         images, shared, points = _differences(found, other)
+    if not all(np.isfinite(part).all() for part in (images, shared, points)):
+        return None
     u = found.system.unknowns
     own = np.diagonal(found.local.points.covariance[u.points], axis1=1, axis2=2)
     return SetDifference(_measured(candidate.name, weight, points, own, other.variance), images, shared, points)

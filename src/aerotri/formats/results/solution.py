@@ -86,8 +86,9 @@ class SavedSolution:
 
     def difference(self, unknowns: Unknowns) -> SetDifference | None:
         """What another set of additional parameters would change; None where there is none."""
-        if self.other_images is None or self.other_shared is None or self.other_points is None:
+        if not self.other_set:
             return None
+        assert self.other_images is not None and self.other_shared is not None and self.other_points is not None
         other, u = OtherSet.from_dict(json.loads(self.other_set)), unknowns
         return SetDifference(other, self.other_images[u.images], self.other_shared, self.other_points[u.points])
 

@@ -174,7 +174,7 @@ def _check_json(archive: Archive, values: dict[str, Any]) -> None:
             raise archive.error("holds no record of the errors of positions")
     if values["other_set"]:
         other = _json(archive, "other_set", values["other_set"])
-        if not _is_record(other, OtherSet) or not all(0.0 <= other[key] <= 1.0 for key in ("weight", "unexplained")):
+        if not _is_record(other, OtherSet) or not all(_is_share(other[key]) for key in ("weight", "unexplained")):
             raise archive.error("holds no record of another set of parameters")
     if values["photograph_fields"]:
         fields = _json(archive, "photograph_fields", values["photograph_fields"])
@@ -187,6 +187,10 @@ def _check_json(archive: Archive, values: dict[str, Any]) -> None:
     good = good and isinstance(content["components"], list) and isinstance(content["rounds"], int)
     if not good or not all(_is_component(entry) for entry in content["components"]):
         raise archive.error("holds no variance components")
+
+
+def _is_share(value: float | None) -> bool:
+    return value is not None and 0.0 <= value <= 1.0
 
 
 def _json(archive: Archive, name: str, text: str) -> Any:
