@@ -86,11 +86,11 @@ class SavedSolution:
 
     def difference(self, unknowns: Unknowns) -> SetDifference | None:
         """What another set of additional parameters would change; None where there is none."""
-        if not self.other_set:
+        images, shared, points = self.other_images, self.other_shared, self.other_points
+        if not self.other_set or images is None or shared is None or points is None:
             return None
-        assert self.other_images is not None and self.other_shared is not None and self.other_points is not None
         other, u = OtherSet.from_dict(json.loads(self.other_set)), unknowns
-        return SetDifference(other, self.other_images[u.images], self.other_shared, self.other_points[u.points])
+        return SetDifference(other, images[u.images], shared, points[u.points])
 
     def removal_records(self) -> tuple[Removal, ...]:
         """The parameters that the selection took out."""
