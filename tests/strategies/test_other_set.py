@@ -142,6 +142,12 @@ def test_it_is_told(both):
     assert ModelPart(other_set=OtherSet("none", 0.5)).as_dict()["other_set"]["height_m"] is None
 
 
+def test_a_change_below_sigma_does_not_count():
+    other = OtherSet(BLUH, 0.5, plan_m=0.1, height_m=0.2, plan_sigma=0.8, height_sigma=1.2, unexplained=0.9)
+    assert other.share == pytest.approx(0.45)
+    assert replace(other, height_sigma=0.9).share == 0.0
+
+
 def test_the_same_set_changes_nothing(monkeypatch, block, both):
     """A set that differs from the one taken by noise alone counts for nothing."""
     result = adjusted(monkeypatch, block, other="lens:k1+k2+p1+p2+k3")

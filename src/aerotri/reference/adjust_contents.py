@@ -241,7 +241,7 @@ ADJUSTMENT = (
         "model_part.other_set.unexplained",
         "number",
         "Share of the squares of the changes that the σ of both sets do not explain. Times the probability it is what "
-        "total σ² contains of them.",
+        "total σ² contains of them, where the change in plan or in height is larger than σ.",
         optional=True,
     ),
     Item(

@@ -68,6 +68,12 @@ class ModelRoot:
         return own if self.beside is None else (*own, *self.beside.parts)
 
 
+LEAST_DIFFERENCE = 1.0
+"""Difference of heights, or in plan, over their σ (RMS of the points) from which another set of parameters counts [C].
+In simulated blocks errors over σ were smaller than 1 below it, where there is nothing to add, and larger than 1 above.
+"""
+
+
 @dataclass(frozen=True)
 class OtherSet:
     """A set of additional parameters that the choice could not tell from the one it took.
@@ -97,7 +103,8 @@ class OtherSet:
     @property
     def share(self) -> float:
         """Of the squares of the differences that counts in total σ."""
-        return self.weight * self.unexplained
+        counts = max(self.plan_sigma, self.height_sigma) > LEAST_DIFFERENCE
+        return self.weight * self.unexplained if counts else 0.0
 
 
 @dataclass(frozen=True, eq=False)

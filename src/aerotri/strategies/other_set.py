@@ -7,8 +7,8 @@ the probability w, the unknowns x_A have the mean square error
 
 [D] Where A is right, d has the covariance Σ_B − Σ_A if A is contained in B: of the squares of d only what exceeds the
 difference of the variances speaks of more than noise. So w·s·d·dᵀ counts beside the covariance of the set taken, s the
-share that the variances leave unexplained, over all points. d is a column of the model part: whatever follows from the
-unknowns has its share of it.
+share that the variances leave unexplained, over all points, where d is larger than σ. d is a column of the model part:
+whatever follows from the unknowns has its share of it.
 """
 
 from __future__ import annotations
