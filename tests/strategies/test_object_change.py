@@ -87,6 +87,16 @@ def test_sets_are_held_against_smaller_ones_that_free_the_lens():
     assert "Not taken though they fit the image points better: legendre:5x5. They bend the block up to" in chosen.reason
 
 
+def test_of_two_sets_that_contradict_each_other_the_farther_one_goes():
+    """Seen in a flight of 1384 photographs: the larger one stayed close to the lens, and went for its size."""
+    lens, unit = made_up(LENS, 5, 0.0, 0.0), leverage(made_up(LENS, 5, 0.0, 0.0), made_up("gruen", 44, 1.0, 0.1))
+    far = made_up("legendre:5x5", 66, 0.9 * MOST_LEVERAGE / unit, 0.1)
+    near = made_up(f"{LENS},collocation:13x9", 90, -0.8 * MOST_LEVERAGE / unit, 0.2)
+    assert leverage(lens, near) < leverage(lens, far) < MOST_LEVERAGE < leverage(near, far)
+    for order in ((lens, far, near), (near, far, lens)):
+        assert set(far_moved(order)) == {far.name}
+
+
 def test_reach_is_the_error_of_an_intersection():
     """A point moves by its reach where every ray errs by 1 rad: drawn directions, intersected with photographs held."""
     block = small_block(3)[0]

@@ -112,7 +112,7 @@ class FarMoved:
 
     Parameters
     ----------
-    against : the smaller set from which it differs most. leverage : as the function has it.
+    against : the set borne out from which it differs most. leverage : as the function has it.
     """
 
     against: str
@@ -130,12 +130,21 @@ def frees_the_lens(outcome: SetOutcome) -> bool:
 def far_moved(outcomes: Sequence[SetOutcome]) -> dict[str, FarMoved]:
     """The sets whose object the image points do not bear out, by name.
 
-    From the smallest set up, each is held against all smaller ones that are borne out themselves and leave the lens
-    free: one that holds it bends the block by the errors of the lens.
+    Sets are taken in the order of their leverage against the smallest one that frees the lens, and each is held against
+    all before it that are borne out themselves and free the lens: one that holds it bends the block by the errors of
+    the lens. Of two that contradict each other the one goes that is farther from the smallest.
     """
+    by_size = sorted(outcomes, key=lambda o: o.effective)
+    first = next((o for o in by_size if frees_the_lens(o)), None)
+
+    def away(outcome: SetOutcome) -> float:
+        if first is None or outcome.effective <= first.effective:
+            return 0.0
+        return float(np.nan_to_num(leverage(first, outcome)))
+
     borne: list[SetOutcome] = []
     found: dict[str, FarMoved] = {}
-    for outcome in sorted(outcomes, key=lambda o: o.effective):
+    for outcome in sorted(by_size, key=away):
         against = [FarMoved(o.name, leverage(o, outcome)) for o in borne if frees_the_lens(o)]
         farthest = max((one for one in against if np.isfinite(one.leverage)), key=lambda f: f.leverage, default=None)
         if farthest is not None and farthest.leverage > MOST_LEVERAGE:
