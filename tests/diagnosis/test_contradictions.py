@@ -103,6 +103,7 @@ def test_what_control_and_gnss_cannot_show():
     motion = found.common_motion
     note = next(f for f in findings(found) if f.quantity == "what this block cannot show")
     assert "map grid" in note.says
+    assert "shadows" in note.says
     assert f"a tilt of all control points against GNSS below {motion.detectable_tilt_m:.2g} m" in note.says
     assert 3.0 < motion.detectable_tilt_m / motion.tilt_m[1] < 5.0
     assert motion.detectable_tilt_m < 2.0

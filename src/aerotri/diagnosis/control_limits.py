@@ -9,6 +9,10 @@ from aerotri.diagnosis.finding import Finding
 from aerotri.results.adjusted_block import AdjustedBlock
 
 FREE = ("estimated", "weighted")
+SHADOWS = (
+    "Tie points on shadows that move by less than the noise of the image points do not show either: a flight at "
+    "another hour does"
+)
 WORTH_SAYING = 4.0
 """σ of the object points, total, from which an error that may stay hidden is told [C]: it would be a gross error."""
 
@@ -29,7 +33,7 @@ def of_control(adjusted: AdjustedBlock) -> list[Finding]:
         if checked
         else "Check points show them, if measured from another base point, with another pole, and on other marks"
     )
-    says = f"No residual shows errors such as: {'; '.join(hidden)}. {remedy}"
+    says = f"No residual shows errors such as: {'; '.join(hidden)}. {remedy}. {SHADOWS}"
     held = (
         "control points alone" if not positions else "GNSS alone" if not len(adjusted.control) else "control and GNSS"
     )

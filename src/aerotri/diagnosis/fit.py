@@ -151,6 +151,13 @@ def _worst(adjusted: AdjustedBlock, labels: list[str], w: np.ndarray, v: np.ndar
     return doubt(labels[k], f"{amount}, |w| {size[k]:.2g}", expected, graded(float(size[k]), critical, GROSS), reason)
 
 
+MANY_LARGE = (
+    "more than chance leaves: look at the largest residuals. Possible causes: wrong matches, and points that move from "
+    "photograph to photograph, such as shadows, water and vehicles. The coordinates of such points err by more than "
+    "their σ"
+)
+
+
 def of_large_residuals(adjusted: AdjustedBlock) -> list[Finding]:
     """Image coordinates beyond the test, and how many chance leaves there."""
     settings = adjusted.block.settings.adjustment
@@ -161,6 +168,6 @@ def of_large_residuals(adjusted: AdjustedBlock) -> list[Finding]:
     chance = settings.alpha * w.size
     largest = f", largest {w.max():.1f}" if w.size else ""
     level = "good" if beyond <= chance + 3.0 * np.sqrt(chance) + 1.0 else "attention"
-    says = "as many as chance leaves" if level == "good" else "more than chance leaves: look at the largest residuals"
+    says = "as many as chance leaves" if level == "good" else MANY_LARGE
     return [Finding(f"image coordinates with |w| > {critical:.2f}", f"{beyond} of {w.size}{largest}",
                     f"about {chance:.0f} by chance (α = {100 * settings.alpha:g} %)", says, level)]  # fmt: skip
