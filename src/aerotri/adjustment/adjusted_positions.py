@@ -21,6 +21,7 @@ import numpy as np
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.robust import Estimator, normalised_lengths, scale_of
 from aerotri.adjustment.solve import INTERRUPTED, Solution, SolveOptions, minimise
+from aerotri.adjustment.stopping import EARLY_STEP_TOLERANCE
 from aerotri.adjustment.unknowns import State
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS
 
@@ -93,8 +94,10 @@ def minimise_at_adjusted(
     -------
     The system with the positions of the solution, and the solution.
     """
-    solution = first = minimise(system, state, redundancy, options)
-    if not follows_solution(system):
+    follows = follows_solution(system)
+    near = max(options.step_tolerance, EARLY_STEP_TOLERANCE) if follows else options.step_tolerance
+    solution = first = minimise(system, state, redundancy, replace(options, step_tolerance=near))
+    if not follows:
         return system, solution
     for round_ in range(MOST_ROUNDS):
         if solution.status != "converged":
@@ -102,10 +105,11 @@ def minimise_at_adjusted(
         there = at_adjusted_positions(system, solution.state, solution.estimator)
         change = max(positions_moved(system, there), _moved_by_velocity(system, there, solution.state))
         unit = unit_of_residuals(system, solution.equations.residual, solution.estimator)
-        if round_ == MOST_ROUNDS - 1 or change < STANDING * unit:
+        if round_ and (round_ == MOST_ROUNDS - 1 or change < STANDING * unit):
             equations = there.assemble(solution.state, 0.0, solution.estimator)
             return there, replace(solution, equations=equations)
-        again = minimise(there, solution.state, redundancy, options.after(solution.iterations))
+        further = replace(options.after(solution.iterations), bent=solution.bent)
+        again = minimise(there, solution.state, redundancy, further)
         again = replace(again, iterations=solution.iterations + again.iterations)
         if again.status != "converged" and again.status != INTERRUPTED:
             if not acts_by_position(system):
@@ -122,8 +126,11 @@ def _without_positions(
 
     Parameters
     ----------
-    first : the solution before anything followed. iterations : made so far; those of the attempt do not count here.
+    first : near the solution before anything followed. iterations : made so far; those of the attempt do not count.
     """
+    if first.estimator.is_robust:
+        first = minimise(measured, first.state, redundancy, replace(options.after(iterations), bent=first.bent))
+        iterations += first.iterations
     first = replace(first, iterations=iterations)
     if not follows_solution(measured):
         return measured, first

@@ -64,6 +64,7 @@ class SolveOptions:
     report : called after every iteration with (iteration, σ0, damping), for progress.
     inspect : may stop the adjustment, whose status is `INTERRUPTED` then.
     step_tolerance : share of σ within which the last robust stage ends.
+    bent : whether whole steps led uphill before, here or nearby: the curvature is then heeded from the first step.
     """
 
     max_iterations: int = 30
@@ -71,6 +72,7 @@ class SolveOptions:
     report: Report | None = None
     inspect: Inspect | None = None
     step_tolerance: float = ROBUST_STEP_TOLERANCE
+    bent: bool = False
 
     def after(self, done: int) -> SolveOptions:
         """The same, with the iterations reported counted on from those done."""
@@ -94,6 +96,7 @@ class Solution:
     costs : Σρ at the start and after every iteration of the last stage.
     defects : sentences naming what the observations leave free, when rank deficient, or why nothing can be computed.
     step_tolerance : share of σ within which a robust adjustment converged.
+    bent : whether a whole step of the last stage led uphill.
     """
 
     status: str
@@ -104,15 +107,20 @@ class Solution:
     costs: tuple[float, ...] = ()
     defects: tuple[str, ...] = ()
     step_tolerance: float = ROBUST_STEP_TOLERANCE
+    bent: bool = False
 
 
 @dataclass(frozen=True)
 class Stage:
-    """One estimator on the way: its name, the iterations before it, and how still it has to stand at its end."""
+    """One estimator on the way: its name, the iterations before it, and how still it has to stand at its end.
+
+    bent : whether the curvature is heeded from the first step.
+    """
 
     name: str
     done: int = 0
     step_tolerance: float = ROBUST_STEP_TOLERANCE
+    bent: bool = False
 
     @property
     def is_robust(self) -> bool:
@@ -121,6 +129,10 @@ class Stage:
     @property
     def robust_tolerance(self) -> float | None:
         return self.step_tolerance if self.is_robust else None
+
+    def heeding(self) -> Stage:
+        """The stage that heeds the curvature."""
+        return replace(self, bent=True, step_tolerance=max(self.step_tolerance, BENT_STEP_TOLERANCE))
 
 
 @dataclass(eq=False)
@@ -131,6 +143,7 @@ class _Course:
     report: Report | None
     redundancy: int
     costs: list[float] = field(default_factory=list)
+    bent: bool = False
 
     def add(self, cost: float, damping: float) -> None:
         """Keep the cost after an iteration, and tell of it."""
@@ -140,7 +153,7 @@ class _Course:
 
     def ended(self, status: str, at: Place) -> Solution:
         """The solution at a place."""
-        return Solution(status, at.state, at.equations, at.estimator, self.iteration, tuple(self.costs))
+        return Solution(status, at.state, at.equations, at.estimator, self.iteration, tuple(self.costs), bent=self.bent)
 
 
 def minimise(system: NormalSystem, state: State, redundancy: int, options: SolveOptions) -> Solution:
@@ -166,17 +179,18 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
             if solution.defects or solution.status == INTERRUPTED:
                 return solution
             state, done = solution.state, solution.iterations
-        return _descend(system, state, redundancy, options, Stage(last, done, options.step_tolerance))
+        stage = Stage(last, done, options.step_tolerance, options.bent and last != "off")
+        return _descend(system, state, redundancy, options, stage)
 
 
 def _descend(system: NormalSystem, state: State, redundancy: int, options: SolveOptions, stage: Stage) -> Solution:
     """Gauss-Newton with the estimator of one stage."""
-    at = _reweighted(system, place_at(system, state, LEAST_SQUARES), stage.name, redundancy)
-    course = _Course(stage.done, options.report, redundancy, [at.equations.cost])
+    at, secants, stage = _begun(system, state, redundancy, stage)
+    course = _Course(stage.done, options.report, redundancy, [at.equations.cost], stage.bent)
     if not at.equations.are_numbers:
         return replace(course.ended("not converged", at), defects=(without_digits(system, at.equations),))
     last_iteration, precision = stage.done + options.max_iterations, first_precision(system, stage.is_robust)
-    damping, secants, scale_changes, last_decrement = Damping(), None, 0, np.inf
+    damping, scale_changes, last_decrement = Damping(), 0, np.inf
     while course.iteration < last_iteration:
         course.iteration += 1
         is_first = course.iteration == 1
@@ -184,7 +198,7 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
         if is_first:
             step, refused = _checked(system, at, step, options, precision)
             if refused is not None:
-                return replace(refused, costs=tuple(course.costs))
+                return replace(refused, costs=tuple(course.costs), bent=stage.bent)
         step, damping = until_better(system, at, step, damping, secants)
         if step is None:
             return course.ended("not converged", at)
@@ -192,6 +206,7 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
         if is_plain and secants is not None:
             step = lengthened(system, at, step)
         secants, stage = _heeding(secants, stage, step, at, damping)
+        course.bent = stage.bent
         if stage.is_robust and is_plain and secants is None:
             step = stretched(system, at, step, last_decrement)
         settled = is_plain and is_settled(at, step, redundancy, stage.robust_tolerance, last_decrement)
@@ -214,6 +229,15 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
         if _is_stopped(system, at, options, course.iteration - stage.done):
             return course.ended(INTERRUPTED, at)
     return course.ended("not converged", at)
+
+
+def _begun(system: NormalSystem, state: State, redundancy: int, stage: Stage) -> tuple[Place, Secants | None, Stage]:
+    """The place where a stage begins; with points at their minimum where the curvature is heeded from the start."""
+    at = _reweighted(system, place_at(system, state, LEAST_SQUARES), stage.name, redundancy)
+    if not stage.bent:
+        return at, None, stage
+    settled = place_at(system, system.settle_points(at.state, at.estimator), at.estimator)
+    return settled, Secants(), stage.heeding()
 
 
 def _followed(
@@ -239,7 +263,7 @@ def _heeding(
     if not (stage.is_robust and damping.value > 0.0):
         return None, stage
     # before this step the right side was not that of points at their minimum: nothing to learn from yet
-    return Secants(), replace(stage, step_tolerance=max(stage.step_tolerance, BENT_STEP_TOLERANCE))
+    return Secants(), stage.heeding()
 
 
 def _checked(

@@ -30,6 +30,7 @@ from aerotri.adjustment.rigging import Rigging
 from aerotri.adjustment.robust import Estimator, normalised_lengths, scale_of
 from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, NotPositiveDefiniteError
+from aerotri.adjustment.stopping import ROBUST_COST_TOLERANCE
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import State, Unknowns
 
@@ -57,12 +58,14 @@ class _Look:
     """What an adjustment is asked while it runs; keeps what it found, rows of the system's photographs and points.
 
     whole : whether points, and steps after the first, are looked at too.
+    last_cost : after the step before.
     """
 
     redundancy: int
     whole: bool
     photographs: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     points: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    last_cost: float = np.inf
 
     def __call__(
         self, system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, iteration: int,
@@ -73,7 +76,10 @@ class _Look:
             if suspect and not len(self.photographs):
                 self.photographs = loose_together(system, state, equations)
         elif self.whole and estimator.is_robust and iteration in LOOKS:
-            self.look(system, state, equations, estimator, iteration >= LONG, in_block=False)
+            # far from the minimum too many points would go; creeping on along single ones, the cost hardly changes
+            creeps = abs(self.last_cost - equations.cost) <= ROBUST_COST_TOLERANCE * self.last_cost
+            self.look(system, state, equations, estimator, iteration >= LONG, in_block=creeps and iteration >= LONG)
+        self.last_cost = equations.cost
         return bool(len(self.photographs) or len(self.points))
 
     def look(
@@ -83,7 +89,7 @@ class _Look:
         """Look at the points, and the photographs too where there is time for that; whether any is loose.
 
         in_block : where a point is loose by its own rays, or the photographs are looked at anyway, so are the points
-            once more, within the whole block. Not on the way: far from the minimum too many would go.
+            once more, within the whole block.
         """
         scale = _scale(system, equations, estimator, self.redundancy)
         self.points = _unless_all(np.flatnonzero(scale * system.looseness(state, estimator) > LOOSE), len(state.points))
@@ -133,7 +139,7 @@ def go_on_without(
     """
     rows = np.flatnonzero(np.isin(prepared.system.unknowns.points, points))
     prepared, state = set_aside(prepared, solution.state, np.zeros(0, dtype=np.int64), rows)
-    options = replace(options, step_tolerance=solution.step_tolerance)
+    options = replace(options, step_tolerance=solution.step_tolerance, bent=solution.bent)
     return _tied(prepared, state, options, redundancy, True, solution.iterations)
 
 
@@ -145,15 +151,15 @@ def _tied(
 
     Where the rest does not converge without the points that were found loose at the end, they stay.
     """
-    round_ = 0
+    round_, bent = 0, options.bent
     settled: tuple[Prepared, Solution] | None = None
     while True:
         freedom = redundancy(prepared.system)
         look = _Look(freedom, whole)
-        counted = replace(options.after(done), inspect=look if round_ < MOST_ROUNDS else None)
+        counted = replace(options.after(done), inspect=look if round_ < MOST_ROUNDS else None, bent=bent)
         system, solution = minimise_at_adjusted(prepared.system, state, freedom, counted)
         prepared = replace(prepared, system=system)
-        done += solution.iterations
+        done, bent = done + solution.iterations, solution.bent
         ended = not solution.defects and solution.status in ("not converged", "converged")
         robust = solution.estimator.is_robust
         if ended and whole and (robust or solution.status != "converged") and round_ < MOST_ROUNDS:
