@@ -59,6 +59,15 @@ def with_adjustment(block: Block, **settings) -> Block:
     return replace(block, settings=replace(block.settings, adjustment=adjustment))
 
 
+def with_gross_errors(block: Block, count: int = 30, size_mm: float = 0.05) -> Block:
+    """Some image points far off."""
+    rng = np.random.default_rng(1)
+    xy = block.image_points.xy.copy()
+    wrong = rng.choice(len(xy), count, replace=False)
+    xy[wrong] += rng.normal(0.0, size_mm, (count, 2))
+    return replace(block, image_points=replace(block.image_points, xy=xy))
+
+
 def adjusted_place(folder: Path, cell: float, count: int) -> tuple[Grid, np.ndarray, np.ndarray, np.ndarray]:
     """A square of cells in the middle of a block whose result is written: its grid, (x, y) of its middle, m, and
     (rows, columns) how far cells lie east and north of it."""

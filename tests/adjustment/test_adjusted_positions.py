@@ -15,7 +15,7 @@ from aerotri.functional_model.additional_parameters import brown
 from aerotri.observations import Prior
 from aerotri.pipeline import adjust, adjust_keeping_system, reopen
 from aerotri.pipeline.local import DETERMINED_BY_NOISE
-from small_blocks import small_block, with_adjustment
+from small_blocks import LONG_FLIGHT, small_block, with_adjustment, with_gross_errors
 
 SETS = ["brown:K1+P1", "bluh:1-12", "legendre:3x3", "lens:k1+k2"]
 FLAT = {"terrain": {"kind": "undulating", "height_m": 100.0, "relief_rms_m": 3.0, "wavelength_m": 900.0}}
@@ -102,3 +102,15 @@ def test_a_result_reopens_at_the_same_positions(tmp_path):
     again = reopen(read_block(tmp_path / "block"), read_solution(tmp_path / "solution.npz"))
     np.testing.assert_allclose(again.system.unknowns.rays.at, found.system.unknowns.rays.at, atol=1e-9)
     assert again.result.outcome.sigma0 == pytest.approx(found.result.outcome.sigma0, rel=1e-9)
+
+
+@pytest.mark.parametrize(("robust", "more"), [("huber", 2), ("adaptive", 5)])
+def test_a_robust_adjustment_converges_once(robust, more):
+    """The positions move its minimum: before they are known it only has to come near, and goes on from there."""
+    block = with_gross_errors(small_block(5, "brown:K1+P1", flight=LONG_FLIGHT)[0], 200)
+    adjusted, measured = (
+        adjust(with_adjustment(block, robust=robust, parameter_position=position, model_part="off")).outcome
+        for position in ("adjusted", "measured")
+    )
+    assert adjusted.status == measured.status == "converged"
+    assert adjusted.iterations <= measured.iterations + more

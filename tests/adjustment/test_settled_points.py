@@ -11,16 +11,7 @@ from aerotri.adjustment.robust import LEAST_SQUARES
 from aerotri.adjustment.settled_points import SETTLED, settled_points
 from aerotri.adjustment.solve import SolveOptions, minimise
 from aerotri.statistics.summarise import count_observations, summarise
-from small_blocks import LONG_FLIGHT, small_block, with_adjustment
-
-
-def with_gross_errors(block, count=30, size_mm=0.05):
-    """Some image points far off."""
-    rng = np.random.default_rng(1)
-    xy = block.image_points.xy.copy()
-    wrong = rng.choice(len(xy), count, replace=False)
-    xy[wrong] += rng.normal(0.0, size_mm, (count, 2))
-    return replace(block, image_points=replace(block.image_points, xy=xy))
+from small_blocks import LONG_FLIGHT, small_block, with_adjustment, with_gross_errors
 
 
 @pytest.fixture(scope="module")

@@ -94,22 +94,21 @@ def minimise_at_adjusted(
     -------
     The system with the positions of the solution, and the solution.
     """
-    follows = follows_solution(system)
-    near = max(options.step_tolerance, EARLY_STEP_TOLERANCE) if follows else options.step_tolerance
-    solution = first = minimise(system, state, redundancy, replace(options, step_tolerance=near))
-    if not follows:
-        return system, solution
+    if not follows_solution(system):
+        return system, minimise(system, state, redundancy, options)
+    early = max(options.step_tolerance, EARLY_STEP_TOLERANCE)
+    solution = first = minimise(system, state, redundancy, replace(options, step_tolerance=early))
     for round_ in range(MOST_ROUNDS):
         if solution.status != "converged":
             break
         there = at_adjusted_positions(system, solution.state, solution.estimator)
         change = max(positions_moved(system, there), _moved_by_velocity(system, there, solution.state))
         unit = unit_of_residuals(system, solution.equations.residual, solution.estimator)
-        if round_ and (round_ == MOST_ROUNDS - 1 or change < STANDING * unit):
+        is_near = round_ == 0 and solution.estimator.is_robust
+        if round_ == MOST_ROUNDS - 1 or (change < STANDING * unit and not is_near):
             equations = there.assemble(solution.state, 0.0, solution.estimator)
             return there, replace(solution, equations=equations)
-        further = replace(options.after(solution.iterations), bent=solution.bent)
-        again = minimise(there, solution.state, redundancy, further)
+        again = minimise(there, solution.state, redundancy, options.going_on(solution))
         again = replace(again, iterations=solution.iterations + again.iterations)
         if again.status != "converged" and again.status != INTERRUPTED:
             if not acts_by_position(system):
@@ -128,14 +127,14 @@ def _without_positions(
     ----------
     first : near the solution before anything followed. iterations : made so far; those of the attempt do not count.
     """
-    if first.estimator.is_robust:
-        first = minimise(measured, first.state, redundancy, replace(options.after(iterations), bent=first.bent))
-        iterations += first.iterations
     first = replace(first, iterations=iterations)
+    if first.estimator.is_robust:
+        first = minimise(measured, first.state, redundancy, options.going_on(first))
+        first = replace(first, iterations=iterations + first.iterations)
     if not follows_solution(measured):
         return measured, first
     system, again = minimise_at_adjusted(measured, first.state, redundancy, options)
-    return system, replace(again, iterations=iterations + again.iterations)
+    return system, replace(again, iterations=first.iterations + again.iterations)
 
 
 def _at_measured_positions(system: NormalSystem) -> NormalSystem:

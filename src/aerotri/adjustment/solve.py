@@ -65,6 +65,7 @@ class SolveOptions:
     inspect : may stop the adjustment, whose status is `INTERRUPTED` then.
     step_tolerance : share of σ within which the last robust stage ends.
     bent : whether whole steps led uphill before, here or nearby: the curvature is then heeded from the first step.
+    is_near : whether the start is near the minimum: the last stage alone is gone through.
     """
 
     max_iterations: int = 30
@@ -73,6 +74,7 @@ class SolveOptions:
     inspect: Inspect | None = None
     step_tolerance: float = ROBUST_STEP_TOLERANCE
     bent: bool = False
+    is_near: bool = False
 
     def after(self, done: int) -> SolveOptions:
         """The same, with the iterations reported counted on from those done."""
@@ -84,6 +86,10 @@ class SolveOptions:
             report(done + iteration, sigma0, damping)
 
         return replace(self, report=counted)
+
+    def going_on(self, solution: Solution) -> SolveOptions:
+        """The same, for equations that differ a little from those of a solution, from where that ended."""
+        return replace(self.after(solution.iterations), bent=solution.bent, is_near=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +177,7 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
         Its equations are assembled, undamped, at its state.
     """
     *early, last = STAGES[options.robust]
-    done = 0
+    early, done = [] if options.is_near else early, 0
     # threads of BLAS wait for work in a loop, after every scalar product: they would take a processor from the kernels
     with blas_threads(0.0):
         for name in early:

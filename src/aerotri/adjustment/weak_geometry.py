@@ -76,9 +76,10 @@ class _Look:
             if suspect and not len(self.photographs):
                 self.photographs = loose_together(system, state, equations)
         elif self.whole and estimator.is_robust and iteration in LOOKS:
-            # far from the minimum too many points would go; creeping on along single ones, the cost hardly changes
+            # far from the minimum too many points would go; where the cost hardly changes, few hold up the others
             creeps = abs(self.last_cost - equations.cost) <= ROBUST_COST_TOLERANCE * self.last_cost
-            self.look(system, state, equations, estimator, iteration >= LONG, in_block=creeps and iteration >= LONG)
+            is_long = iteration >= LONG
+            self.look(system, state, equations, estimator, is_long, in_block=creeps and is_long)
         self.last_cost = equations.cost
         return bool(len(self.photographs) or len(self.points))
 
