@@ -9,7 +9,9 @@ import pytest
 
 import aerotri
 from aerotri.observations import Block
-from small_blocks import small_block
+from aerotri.pipeline import adjust
+from odd_blocks import drawn, odd_block
+from small_blocks import small_block, with_adjustment
 
 PARAMETERS = "bluh:1-12"
 
@@ -68,6 +70,14 @@ def test_image_points_without_errors(usual, noise_mm, robust):
     assert found.adjusted.outcome.iterations <= 20
     assert any("no residuals" in sentence for sentence in found.warnings)
     assert np.nanmax(np.abs(found.adjusted.points.xyz - usual[1].adjusted.points.xyz)) < 1e-4
+
+
+@pytest.mark.parametrize("robust", ["off", "huber"])
+def test_steps_that_promise_no_more_than_rounding_are_the_end(robust):
+    """Such a step leads uphill as often as down: no damping helps."""
+    found = adjust(with_adjustment(odd_block(drawn(40)), robust=robust))
+    assert found.outcome.status == "converged"
+    assert found.outcome.iterations <= 15
 
 
 def test_sigma_far_too_large_are_said(usual):

@@ -215,7 +215,9 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
         course.bent = stage.bent
         if stage.is_robust and is_plain and secants is None:
             step = stretched(system, at, step, last_decrement)
-        settled = is_plain and is_settled(at, step, redundancy, stage.robust_tolerance, last_decrement)
+        is_rounding = damping.value == 0.0 and step.decrement <= at.equations.rounding
+        ends = is_plain or is_rounding
+        settled = ends and is_settled(at, step, redundancy, stage.robust_tolerance, last_decrement)
         last_decrement = step.decrement if is_plain else np.inf
         damping = damping.lowered(step.gain_ratio(at.equations), secants is not None)
         course.add(step.equations.cost, damping.value)
