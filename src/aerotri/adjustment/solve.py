@@ -226,7 +226,9 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
             precision = DOUBLE
         else:
             at = assembled(system, step.place)
-        may_change = at.estimator.is_robust and scale_changes < MAX_SCALE_CHANGES
+        # residuals that are rounding tell no scale
+        has_scale = at.estimator.is_robust and at.equations.cost > at.equations.rounding
+        may_change = has_scale and scale_changes < MAX_SCALE_CHANGES
         fresh = _reweighted(system, at, stage.name, redundancy) if may_change else at
         if fresh is not at:
             at, settled, last_decrement, scale_changes = fresh, False, np.inf, scale_changes + 1
