@@ -43,8 +43,9 @@ from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.unmodelled_shutter import CHANCE, UnmodelledShutter
 
 LENS, AFFINITY = ("K1", "K2", "K3", "P1", "P2"), ("b1", "b2")
-SMOOTH, ORDER = "legendre", 4
-"""Smooth image errors that the parameters of the block do not contain: products of polynomials up to this order [C]."""
+SMOOTH, ORDER, ORDER_OF_LARGE, LARGE = "legendre", 4, 2, 5000
+"""Smooth image errors that the parameters of the block do not contain: products of polynomials up to this order, and in
+a block of more than LARGE photographs [C]: their 42 columns would cost a fifth of the adjustment."""
 BROWN = "brown"
 LIKE_A_SHUTTER = ("affinity", "shear")
 """Of these, what a rolling shutter is to first order: looked at beside it, not taken for granted."""
@@ -139,7 +140,8 @@ def _with_terms(block: Block, shutters: dict[str, RollingShutter], terms: tuple[
     if terms:
         own = chosen.get(BROWN, ())
         chosen[BROWN] = (*own, *(term for term in terms if term not in own))
-    items = () if SMOOTH in chosen else tuple(i for i in items_of_order(ORDER, ORDER) if i not in LIKE_A_SHUTTER)
+    order = ORDER if len(block.images) <= LARGE else ORDER_OF_LARGE
+    items = () if SMOOTH in chosen else tuple(i for i in items_of_order(order, order) if i not in LIKE_A_SHUTTER)
     if items:
         chosen[SMOOTH] = items
     prior = Prior(0.0, 1e-3 * smooth_um)
