@@ -10,7 +10,7 @@ import wrong_blocks
 from aerotri.diagnosis.unmodelled_shutter import of_unmodelled_shutter
 from aerotri.observations.rolling_shutter import RollingShutter
 from aerotri.pipeline import adjust_keeping_system
-from aerotri.results.unmodelled_shutter import CHANCE
+from aerotri.results.unmodelled_shutter import CHANCE, SUSPECTED
 from aerotri.simulation import parse_spec, simulate
 
 WORDS = "as by a rolling shutter"
@@ -83,6 +83,13 @@ def test_an_affinity_that_explains_it_as_well_is_said():
     for p_beside, said in ((0.5, True), (float("nan"), True), (1e-6, False)):
         one = replace(local, unmodelled_shutter=replace(found, p_beside=p_beside))
         assert ("affinity" in of_unmodelled_shutter(one)[0].reason) == said
+
+
+def test_what_may_be_chance_is_told_without_a_doubt():
+    local = adjust_keeping_system(drone(2)).local
+    found = replace(local.unmodelled_shutter, p=0.5 * (CHANCE + SUSPECTED), moves_sigma=2.0)
+    said = of_unmodelled_shutter(replace(local, unmodelled_shutter=found))
+    assert [(one.level, one.grade) for one in said] == [("attention", "accepted")]
 
 
 def test_film_has_none():

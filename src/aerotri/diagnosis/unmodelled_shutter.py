@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from aerotri.diagnosis.common_motion import NO_DOUBT
 from aerotri.diagnosis.finding import Finding, doubt
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.unmodelled_shutter import UnmodelledShutter
@@ -13,6 +14,8 @@ def of_unmodelled_shutter(adjusted: AdjustedBlock) -> list[Finding]:
     if found is None:
         return []
     name, expected = "rolling shutter of a camera that states none", "0 within σ"
+    if found.is_suspected and not found.counts:
+        return [Finding(name, _way(found), expected, f"{_reason(found)}. {NO_DOUBT}", "attention")]
     if not found.counts:
         return [Finding(name, _way(found), expected, "none is needed", "good")]
     return doubt(name, _way(found), expected, "doubtful", _reason(found))

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 CHANCE = 3e-4
 """Probability of a way by chance below which it counts, of all cameras together: as of the other contradictions."""
+SUSPECTED = 1e-2
+"""The same below which it is told without a doubt of the result [C]."""
 BESIDE = 1e-3
 """Probability below which a way counts beside an affinity of the camera."""
 MATERIAL = 0.5
@@ -40,6 +42,11 @@ class UnmodelledShutter:
     def counts(self) -> bool:
         """Whether chance does not explain it, and the object points would move."""
         return self.p < CHANCE and self.moves_sigma > MATERIAL
+
+    @property
+    def is_suspected(self) -> bool:
+        """Whether it is told, though it may be chance."""
+        return self.p < SUSPECTED and self.moves_sigma > MATERIAL
 
     @property
     def is_told_apart(self) -> bool:
