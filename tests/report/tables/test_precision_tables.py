@@ -7,6 +7,8 @@ import pytest
 
 from aerotri.report.pages.adjustment import Findings, report_html
 from aerotri.report.tables import precision as precision_tables
+from aerotri.results.model_part import CommonPart, ControlEvidence, ModelPart
+from aerotri.statistics.common_modes import HEIGHT, PLAN
 from aerotri.statistics.parameter_effects import LeftOut, ParameterEffects
 from aerotri.statistics.precision import practical_precision, theoretical_precision
 from synthetic import make_adjusted_block
@@ -36,6 +38,37 @@ def test_ellipsoids_by_hand(adjusted):
     assert row[2:6] == pytest.approx((0.003, 0.002, 0.001, 90.0))
     assert row[6:8] == pytest.approx((0.003, 0.05))
     assert row[8] == str(adjusted.block.points[7])
+
+
+def test_common_and_local_parts(adjusted):
+    """.3 and .4 m make .5 m: 36 and 64 % of the variance; no column of the noise where that is all."""
+    assert precision_tables.common(adjusted).rows == ()
+    parts = (
+        CommonPart("height: tilt", 0.1, 0.3),
+        CommonPart("height: local", 0.2, 0.4),
+        CommonPart("plan: local", 0, 0),
+    )
+    found = precision_tables.common(replace(adjusted, model_part=ModelPart(scheme="strip", common=parts)))
+    assert [row[2:4] for row in found.rows] == [(0.1, 0.3), (0.2, 0.4), (0, 0)]
+    assert [row[4] for row in found.rows[:2]] == pytest.approx([36.0, 64.0])
+    plain = precision_tables.common(replace(adjusted, model_part=ModelPart(common=parts)))
+    assert [column.name for column in plain.columns] == ["part", "what it is", "total σ", "share of the variance"]
+
+
+def test_every_common_part_has_its_words():
+    assert set(precision_tables.ERRORS_IN_COMMON) == {
+        f"{kind}: {mode}" for kind, modes in (("height", HEIGHT), ("plan", PLAN)) for mode in (*modes, "local")
+    }
+
+
+def test_what_control_says_of_sigma(adjusted):
+    found = ControlEvidence(12, 5, 2.0, 0.001, 1.1, 0.4, 1.9, 1.05)
+    made = replace(adjusted, model_part=ModelPart(control=found))
+    assert [row[1:] for row in precision_tables.control_evidence(made).rows] == [
+        (2.0, 0.001), (1.1, 0.4), (1.9, None), (1.05, None),
+    ]  # fmt: skip
+    few = replace(adjusted, model_part=ModelPart(control=ControlEvidence(3)))
+    assert precision_tables.control_evidence(few).rows == ()
 
 
 def test_correlations_are_named_above_the_threshold(adjusted):

@@ -291,6 +291,8 @@ def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
         "parameters": tables.parameters(adjusted),
         "correlations": precision_tables.correlations(adjusted),
         "relative": precision_tables.relative(adjusted),
+        "common": precision_tables.common(adjusted),
+        "control_evidence": precision_tables.control_evidence(adjusted),
         "precision": precision_tables.precision(adjusted),
         "ellipsoids": precision_tables.ellipsoids(adjusted),
         "orientation_correlations": precision_tables.orientation_correlations(adjusted),

@@ -29,6 +29,17 @@ MOST_CORRELATIONS = 200
 NAMED_FROM = 0.7
 """Correlation of shared parameters from which on a pair is named in the table [C]."""
 
+ERRORS_IN_COMMON = {
+    "height: shift": "all heights too high or too low together",
+    "height: tilt": "the whole block leans",
+    "height: bend": "the whole block is bent: a bowl, a saddle",
+    "height: local": "every point by itself",
+    "plan: shift": "all points shifted together",
+    "plan: turn and scale": "the whole block turned, too large or too small",
+    "plan: local": "every point by itself",
+}
+"""Parts of σ of the object points by the names of `CommonPart`."""
+
 
 def precision(adjusted: AdjustedBlock) -> Table:
     """Theoretical precision μ of the object points and practical precision at the check points."""
@@ -92,6 +103,42 @@ def _values(values: np.ndarray) -> list[float | None]:
 
 def _value(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
+
+
+def common(adjusted: AdjustedBlock) -> Table:
+    """How much of σ of the points is one error of all of them, and how much is local; no rows where it is not known."""
+    part = adjusted.model_part
+    rows = [] if part is None else [(one.part, ERRORS_IN_COMMON[one.part], one) for one in part.common]
+    squares = {
+        kind: sum(one.total_m**2 for *_, one in rows if one.part.startswith(kind)) or np.nan
+        for kind in ("height", "plan")
+    }
+    noise = [(Column("σ of the noise", "m", ".3g"), [one.sigma_m for *_, one in rows])]
+    return table(
+        "One common error, or many local ones",
+        (Column("part"), [name for name, *_ in rows]),
+        (Column("what it is"), [says for _, says, _ in rows]),
+        *(noise if part is not None and part.counts else []),
+        (Column("total σ", "m", ".3g"), [one.total_m for *_, one in rows]),
+        (
+            Column("share of the variance", "%", ".0f"),
+            [100.0 * one.total_m**2 / squares[name.partition(":")[0]] for name, _, one in rows],
+        ),
+    )
+
+
+def control_evidence(adjusted: AdjustedBlock) -> Table:
+    """What the control points say of σ; no rows where too few are known."""
+    found = None if adjusted.model_part is None else adjusted.model_part.control
+    rows: list[tuple[Any, ...]] = []
+    if found is not None and found.freedom > 0:
+        contradictions = f"contradictions among control points and photographs ({found.freedom} independent)"
+        rows.append((f"{contradictions}, over σ", _value(found.ratio), _value(found.p)))
+        rows.append((f"{contradictions}, over total σ", _value(found.ratio_total), _value(found.p_total)))
+        rows.append(("each control point left out in turn: its error over σ", _value(found.left_out), None))
+        rows.append(("the same over total σ", _value(found.left_out_total), None))
+    columns = (Column("what"), Column("RMS", "", ".2f"), Column("probability", "", ".3g"))
+    return Table("What the control points say of σ", columns, tuple(row for row in rows if row[1] is not None))
 
 
 def ellipsoids(adjusted: AdjustedBlock) -> Table:
