@@ -88,7 +88,9 @@ def common_parts(
             own = [float(values[begun : begun + size].sum()) for values in sums]
             left, begun = [a - b for a, b in zip(left, own, strict=True)], begun + size
             parts.append(CommonPart(f"{name}: {mode}", *(float(np.sqrt(value)) for value in own)))
-        parts.append(CommonPart(f"{name}: local", *(float(np.sqrt(max(value, 0.0))) for value in left)))
+        # groups that agree better than the noise from point to point take nothing from it
+        noise_left, total_left = max(left[0], 0.0), max(*left, 0.0)
+        parts.append(CommonPart(f"{name}: local", float(np.sqrt(noise_left)), float(np.sqrt(total_left))))
     return tuple(parts)
 
 
