@@ -19,10 +19,12 @@ from aerotri.cli.options import (
     PLACE,
     SIGMAS,
     AnglesSigma,
+    AxesOfLists,
     CameraFile,
     CameraName,
     CameraSize,
     CheckPoints,
+    ColumnsOfList,
     ControlPrefix,
     ControlSigma,
     FocalLength,
@@ -116,10 +118,8 @@ def convert(
         str | None,
         typer.Option(help="Shift of GNSS as an unknown: off (default), block or strip.", rich_help_panel=METHOD),
     ] = None,
-    axes: Annotated[
-        str | None,
-        typer.Option(help="Order of coordinates in lists of Pix4D: xy or yx.", rich_help_panel=INPUT),
-    ] = None,
+    axes: AxesOfLists = None,
+    columns: ColumnsOfList = "",
     offset: Annotated[
         Path | None, typer.Option(help="_offset.xyz of Pix4D, added to orientations.", rich_help_panel=INPUT)
     ] = None,
@@ -186,9 +186,10 @@ def convert(
             control_heights=control_heights,
             linear_alteration_m=linear_alteration,
             patb_rotation=patb_rotation,
+            axes=axes,
+            columns=columns,
         ),
         check=tuple(check or ()),
-        axes=axes,
         offset=offset,
         image_sigma_um=image_sigma_um,
         image_sigma_px=image_sigma_px,
@@ -233,6 +234,8 @@ def tiepoints(
     geoid: GeoidGrid = None,
     control_sigma_m: ControlSigma = "",
     control_prefix: ControlPrefix = "",
+    axes: AxesOfLists = None,
+    columns: ColumnsOfList = "",
     mark_sigma_px: Annotated[
         float,
         typer.Option(
@@ -282,6 +285,8 @@ def tiepoints(
         geoid=geoid,
         **_stated_sigmas(control_sigma_m, positions_sigma_m, orientation_sigma_m, orientation_sigma_deg),
         control_prefix=control_prefix,
+        axes=axes,
+        columns=columns,
     )
     options = TiePointOptions(
         gcp=gcp,

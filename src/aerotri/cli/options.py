@@ -67,10 +67,26 @@ CheckPoints = Annotated[
         rich_help_panel=CONTROL,
     ),
 ]
+AxesOfLists = Annotated[
+    str | None,
+    typer.Option(
+        help="Lists that do not name their columns: yx where Y, or the latitude, comes first. Default: as the "
+        "coordinate system has them.",
+        rich_help_panel=INPUT,
+    ),
+]
+ColumnsOfList = Annotated[
+    str,
+    typer.Option(
+        help="Columns of a list of control points that does not name them (of positions where there are none): PNEZD, "
+        "or names as name,Y,X,Z,-.",
+        rich_help_panel=INPUT,
+    ),
+]
 ControlPrefix = Annotated[
     str,
     typer.Option(
-        help="What stands before the names of control points in the image points, such as GCP_.",
+        help="What stands before the names of control points in image points or in their list alone, such as GCP_.",
         rich_help_panel=CONTROL,
     ),
 ]

@@ -171,7 +171,7 @@ def is_projected(crs: str) -> bool:
 
 
 def read_crs(crs: str) -> CRS:
-    """The system of a code.
+    """The system of a code, or of a definition (WKT).
 
     Raises
     ------
@@ -181,8 +181,8 @@ def read_crs(crs: str) -> CRS:
     from pyproj import CRS
     from pyproj.exceptions import CRSError
 
-    if not CRS_PATTERN.fullmatch(crs):
-        raise InputError(f"crs '{crs}' is not understood", CRS_REMEDY, file="block.toml")
+    if not CRS_PATTERN.fullmatch(crs) and "[" not in crs:
+        raise InputError(f"crs '{crs[:80]}' is not understood", CRS_REMEDY, file="block.toml")
     try:
         return CRS.from_user_input(crs)
     except CRSError:

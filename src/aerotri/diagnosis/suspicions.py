@@ -50,12 +50,14 @@ def suspicions(block: Block, found: Inventory, angle_unit: str) -> tuple[str, ..
         *_lonely(block, found),
         *_apart(found),
         *_alike(block),
-        *_places(block),
-        *_formats(block),
-        *_pixels(block),
-        *_control_sigma(block),
+        *suspicions_of_lists(block),
         *_angle_unit(block, angle_unit),
     )
+
+
+def suspicions_of_lists(block: Block) -> tuple[str, ...]:
+    """Sentences about places and units of what was put together: the same for every command that reads lists."""
+    return (*_places(block), *_formats(block), *_pixels(block), *_control_sigma(block))
 
 
 def _lonely(block: Block, found: Inventory) -> list[str]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import replace
 from difflib import SequenceMatcher
 
@@ -103,14 +103,21 @@ def _with_affix(one: str, other: str) -> bool:
 
 
 def prefix_of(names: Iterable[str], known: Iterable[str]) -> str | None:
-    """What stands before most of the names where they are found among the known ones; None where nothing fits."""
+    """What stands before most of the names in one of the two lists alone; None where nothing fits."""
     known, found = list(known), Counter[str]()
     for name in list(names)[:MOST_COMPARED]:
+        pairs = (sorted((name, other), key=len) for other in known if len(other) != len(name))
         found.update(
-            other[: -len(name)] for other in known
-            if len(other) > len(name) and other.endswith(name) and _with_affix(name, other)
+            long[: -len(short)] for short, long in pairs
+            if long.endswith(short) and _with_affix(short, long)
         )  # fmt: skip
     return found.most_common(1)[0][0] if found else None
+
+
+def under_prefix(name: str, prefix: str, measured: Container[str]) -> str:
+    """What image points call a control point: its name with the prefix, or without it where that is measured."""
+    bare = name.removeprefix(prefix)
+    return bare if prefix + name not in measured and bare != name and bare in measured else prefix + name
 
 
 def in_words(names: Sequence[str], known: Iterable[str], left_over: Sequence[str] = ()) -> str:
@@ -193,7 +200,7 @@ def with_control_prefix(block: Block, prefix: str) -> Block:
 
     Parameters
     ----------
-    prefix : stands before their names there; '' changes nothing.
+    prefix : stands before their names there, or before their names in the list of control; '' changes nothing.
 
     Raises
     ------
@@ -204,8 +211,9 @@ def with_control_prefix(block: Block, prefix: str) -> Block:
         return block
     place = {str(name): k for k, name in enumerate(block.points.tolist())}
     measured = set(np.unique(block.image_points.point).tolist())
+    names = {str(block.points[k]) for k in measured}
     lonely = block.control.point[without_image_points(block)]
-    moved = {int(k): place.get(prefix + str(block.points[k]), -1) for k in lonely}
+    moved = {int(k): place.get(under_prefix(str(block.points[k]), prefix, names), -1) for k in lonely}
     moved = {old: new for old, new in moved.items() if new in measured}
     if not moved:
         names = block.points[lonely].astype(str).tolist()

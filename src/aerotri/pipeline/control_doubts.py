@@ -10,6 +10,7 @@ from aerotri.conventions import FilePath
 from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.diagnosis.control_marks import contradictions_in_words, marks_of, rays_that_tell
 from aerotri.diagnosis.control_points import doubts_of_control, doubts_with_orientation
+from aerotri.diagnosis.suspicions import suspicions_of_lists
 from aerotri.formats.assembly.oriented import oriented_from_adjusted
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block, ImagePoints
@@ -29,9 +30,10 @@ def doubts_at_start(block: Block, geoid: FilePath | None = None) -> tuple[str, .
 
 
 def with_control_doubts(found: Adjustment, given: Block) -> Adjustment:
-    """The adjustment with sentences about its control among the warnings; `given` is its block in the CRS."""
+    """The adjustment with sentences about its control and its lists among the warnings; `given` is in the CRS."""
     outcome = found.result.outcome
-    said = (*_of_marks(found.local), *doubts_of_control(given))
+    said = (*_of_marks(found.local), *doubts_of_control(given), *suspicions_of_lists(given))
+    said = tuple(text for text in said if text not in outcome.warnings)
     return with_outcome(found, replace(outcome, warnings=(*outcome.warnings, *said))) if said else found
 
 

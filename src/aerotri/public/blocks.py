@@ -126,6 +126,7 @@ def read(
     gnss_shift: GnssShift | None = None,
     geoid: FilePath | None = None,
     axes: Axes | None = None,
+    columns: str = "",
     offset: FilePath | None = None,
     patb_rotation: PatbRotation | None = None,
     linear_alteration_m: float | None = None,
@@ -163,7 +164,10 @@ def read(
     orientation_sigma_deg : the same of ω, φ, κ, degrees.
     gnss_shift : estimate a shift of the GNSS positions, of the block or of every strip.
     geoid : grid of geoid undulations for heights of the coordinate system.
-    axes : order of coordinates in lists of Pix4D; as the coordinate system has them where None.
+    axes : 'yx' where lists that do not name their columns have Y, or the latitude, first; as the coordinate system has
+        them where None.
+    columns : of such a list of control points (of positions where there are none): letters such as 'PNEZD', or names
+        separated by commas.
     offset : _offset.xyz of Pix4D, added to orientations.
     patb_rotation : meaning of the matrices of an .ori file; told by the image points where None.
     linear_alteration_m : m, mean height of the ground, where heights of orientations are corrected for the scale of the
@@ -209,6 +213,7 @@ def read(
             gnss_shift=gnss_shift,
             geoid=geoid,
             axes=axes,
+            columns=columns,
             offset=offset,
             patb_rotation=patb_rotation,
             linear_alteration_m=linear_alteration_m,
@@ -246,6 +251,7 @@ def request_of(
     gnss_shift: GnssShift | None = None,
     geoid: FilePath | None = None,
     axes: Axes | None = None,
+    columns: str = "",
     offset: FilePath | None = None,
     patb_rotation: PatbRotation | None = None,
     linear_alteration_m: float | None = None,
@@ -273,6 +279,8 @@ def request_of(
         control_heights=control_heights,
         linear_alteration_m=linear_alteration_m,
         patb_rotation=patb_rotation,
+        axes=axes,
+        columns=columns,
     )
     return Request(
         source=text_of_path(source),
@@ -284,7 +292,6 @@ def request_of(
         camera=CameraSpec(camera, camera_name, camera_size, pixel_um, focal_length_mm, flight_axis, free_interior),
         stated=stated,
         check=tuple(check),
-        axes=axes,
         offset=offset,
         image_sigma_um=image_sigma_um,
         image_sigma_px=image_sigma_px,

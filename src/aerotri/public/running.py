@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from aerotri.conventions import FilePath, real_path
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.execution.opening import opened
-from aerotri.public.blocks import Sigmas
+from aerotri.public.blocks import Axes, Sigmas
 from aerotri.public.folders import refuse_no_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.run_chain import OnStep, RunChain
@@ -41,6 +41,8 @@ def run(
     check: Sequence[str] = (),
     control_sigma_m: Sigmas | None = None,
     control_prefix: str = "",
+    axes: Axes | None = None,
+    columns: str = "",
     positions: FilePath | None = None,
     camera: FilePath | None = None,
     focal_length_mm: float | None = None,
@@ -78,6 +80,10 @@ def run(
     check : names of control points that become check points.
     control_sigma_m : σ of X, Y, Z, m, of control points without one; 0: without error, held.
     control_prefix : what image points have before the names of control points.
+    axes : 'yx' where lists that do not name their columns have Y, or the latitude, first; as the coordinate system has
+        them where None.
+    columns : of such a list of control points (of positions where there are none): letters such as 'PNEZD', or names
+        separated by commas.
     positions : of the photographs, in place of EXIF.
     camera : file with the camera.
     focal_length_mm : in place of EXIF.
@@ -141,6 +147,7 @@ def run(
     settings: dict[Verb, dict[str, Any]] = {
         "tie_points": {
             "control": control, "control_sigma_m": control_sigma_m, "control_prefix": control_prefix if marked else "",
+            "axes": axes, "columns": columns,
             "positions": positions, "camera": camera, "focal_length_mm": focal_length_mm, "pixel_um": pixel_um,
             "crs": crs, "geoid": geoid, "seed": seed, "executor": elsewhere, "project": project,
             **({} if from_block else names),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import FilePath
 from aerotri.execution.choice import THREADS
-from aerotri.public.blocks import Sigmas, text_of_path
+from aerotri.public.blocks import Axes, Sigmas, text_of_path
 from aerotri.public.folders import refuse_foreign_entries, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.projects import project_of
@@ -172,6 +172,8 @@ def tie_points(
     geoid: FilePath | None = None,
     control_sigma_m: Sigmas | None = None,
     control_prefix: str = "",
+    axes: Axes | None = None,
+    columns: str = "",
     mark_sigma_px: float = DEFAULTS.mark_sigma_px,
     positions_sigma_m: Sigmas | None = None,
     orientation_sigma_m: Sigmas | None = None,
@@ -203,6 +205,10 @@ def tie_points(
     geoid : grid of geoid undulations for its heights.
     control_sigma_m : σ of X, Y, Z, m, of control points without one; 0: without error, held.
     control_prefix : what image points have before the names of control points.
+    axes : 'yx' where lists that do not name their columns have Y, or the latitude, first; as the coordinate system has
+        them where None.
+    columns : of such a list of control points (of positions where there are none): letters such as 'PNEZD', or names
+        separated by commas.
     mark_sigma_px : σ of the image points of control, pixels.
     positions_sigma_m : σ of X, Y, Z, m, of positions without one.
     orientation_sigma_m : orientations are observations: σ of X, Y, Z, m.
@@ -240,6 +246,7 @@ def tie_points(
         "control": control, "check": check, "positions": positions, "orientation": orientation, "camera": camera,
         "focal_length_mm": focal_length_mm, "pixel_um": pixel_um, "free_interior": free_interior, "crs": crs,
         "geoid": geoid, "control_sigma_m": control_sigma_m, "control_prefix": control_prefix,
+        "axes": axes, "columns": columns,
         "mark_sigma_px": mark_sigma_px, "positions_sigma_m": positions_sigma_m,
         "orientation_sigma_m": orientation_sigma_m, "orientation_sigma_deg": orientation_sigma_deg, "points": points,
         "features": features, "feature_size": feature_size, "neighbours": neighbours, "seed": seed,
@@ -256,7 +263,7 @@ def tie_points(
     stated = Statements(
         crs=crs, geoid=geoid, control_sigma_m=control_sigma_m, positions_sigma_m=positions_sigma_m,
         orientation_sigma_m=orientation_sigma_m, orientation_sigma_deg=orientation_sigma_deg,
-        control_prefix=control_prefix,
+        control_prefix=control_prefix, axes=axes, columns=columns,
     )  # fmt: skip
     files = GivenFiles(text_of_path(control), tuple(check), text_of_path(positions), text_of_path(orientation), stated)
     spec = CameraSpec(camera, "", None, pixel_um, focal_length_mm, None, free_interior)

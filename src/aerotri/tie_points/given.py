@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from aerotri.coordinates.georeference import is_projected, utm_crs
+from aerotri.crs_text import plan_of
 from aerotri.formats.assembly import assemble, placing
 from aerotri.formats.assembly.assemble_control import with_check_points, with_control
 from aerotri.formats.assembly.names_match import match_photographs
@@ -45,13 +46,15 @@ def crs_of(photographs: PhotographSet, given: Given) -> str:
     if given.stated.crs:
         return placing.known_crs(given.stated.crs)
     lists = [part for part in (given.control, given.positions) if part is not None]
-    for part in lists:
-        if part.crs:
-            return part.crs if is_projected(part.crs) else utm_crs(part.xyz[:, 0], part.xyz[:, 1])
     known = np.isfinite(photographs.lon_lat_height).all(axis=1)
-    if not known.any():
+    utm = utm_crs(*photographs.lon_lat_height[known, :2].T) if known.any() else ""
+    told = placing.system_of_lists(lists)
+    if told:
+        # longitude and latitude of a list may be exchanged: photographs know better in which zone they lie
+        in_degrees = not any(part.crs and is_projected(plan_of(part.crs)) for part in lists)
+        return utm if utm and in_degrees else told
+    if not utm:
         return "local"
-    utm = utm_crs(*photographs.lon_lat_height[known, :2].T)
     centres = [part.centre for part in (given.orientation,) if part is not None]
     coordinates = [*(part.xyz for part in lists), *centres]
     return utm if all(_lie_near(photographs.lon_lat_height[known], utm, xyz) for xyz in coordinates) else "local"
@@ -76,7 +79,7 @@ def positions_in(photographs: PhotographSet, given: Given, crs: str) -> tuple[Po
         why = "the block has none" if control is None else f"{control.path.name} names none and is not in UTM"
         return None, (f"positions of EXIF were left out for want of a coordinate system: {why}; state it with --crs",)
     xyz = photographs.lon_lat_height[known]
-    flat = placing.to_crs(xyz, "EPSG:4326", placing.horizontal_part(crs), None)
+    flat = placing.to_crs(xyz, "EPSG:4326", plan_of(crs), None)
     said = []
     first = given.control or given.orientation
     if first is not None and not getattr(first, "crs", "") and not given.stated.crs:

@@ -13,6 +13,7 @@ from aerotri.adjustment.parallel import thread_count
 from aerotri.conventions import InputError, mm_from_px, real_path
 from aerotri.coordinates.blocks import transform_block
 from aerotri.diagnosis.control_points import doubts_with_orientation
+from aerotri.diagnosis.suspicions import suspicions_of_lists
 from aerotri.execution.work import Workplace
 from aerotri.formats.assembly import assemble
 from aerotri.formats.assembly.parts import PositionList, Reading, no_sigma
@@ -126,7 +127,7 @@ def tie_photographs(
     frame = oriented.frame
     placed_block = in_frame(reading.block, frame)
     found = reproject(*placed_block)
-    about_control = doubts_with_orientation(*placed_block)
+    about_control = (*doubts_with_orientation(*placed_block), *suspicions_of_lists(reading.block))
     local = reading.block if frame is None else transform_block(reading.block, frame)
     offset_px, unsettled = adjusted_offsets(local, found.points, found.offset_px)
     block, sigma_px = with_sigma_of_ties(reading.block, offset_px, len(tracks))
@@ -215,7 +216,7 @@ def _refuse_bad_lists(photographs: PhotographSet, given: Given, crs: str, positi
         Tracks(np.zeros(1, np.int64), nothing, nothing),
         (np.zeros((0, 2)), np.zeros(0)),
     )
-    reading = complete(Reading(bare), given, crs, positions)
+    reading = with_unmarked_control(complete(Reading(bare), given, crs, positions), given)
     if given.orientation is not None and not is_observed(given.stated):
         assemble.with_orientations(reading, given.orientation, given.stated)
 

@@ -60,16 +60,19 @@ def read_given(files: GivenFiles, mark_sigma_px: float) -> Given:
     InputError
         For a file that cannot be read, or check points without control.
     """
-    stated, reading = files.stated, kinds.ReadingOptions(kinds.axes_of(files.stated.crs))
+    stated, reading = files.stated, kinds.options_of(files.stated)
     if files.check and not files.control:
         raise InputError("--check names control points, and there are none", "give them: --gcp gcp_list.txt")
+    if stated.columns and not (files.control or files.positions):
+        raise InputError("--columns is given, but no list of points", "give it: --gcp FILE, or --positions FILE")
+    of_positions = reading.beside_control() if files.control else reading
     control = None
     if files.control:
         control = _with_prefix(kinds.read_control(files.control, reading), stated.control_prefix)
     return Given(
         # the names have the prefix already
         stated=replace(stated, control_prefix=""),
-        positions=kinds.read_position_list(files.positions, reading) if files.positions else None,
+        positions=kinds.read_position_list(files.positions, of_positions) if files.positions else None,
         control=control,
         check=tuple(_in_block(name, control, stated.control_prefix) for name in files.check),
         orientation=kinds.read_orientations(files.orientation, reading) if files.orientation else None,

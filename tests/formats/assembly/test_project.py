@@ -11,12 +11,12 @@ from oriented_sample import oriented_sample, prediction
 
 from aerotri.conventions import InputError
 from aerotri.coordinates import local_frame
+from aerotri.crs_text import plan_of
 from aerotri.formats.assembly.assemble import Statements
 from aerotri.formats.assembly.camera_spec import CameraSpec
 from aerotri.formats.assembly.names_match import match_photographs
 from aerotri.formats.assembly.placing import (
     from_ellipsoidal_heights,
-    horizontal_part,
     in_local_frame,
     rotation_from_yaw_pitch_roll,
     to_crs,
@@ -165,7 +165,7 @@ def test_axes(files):
     rows = [line.split(",") for line in (files / "geo.csv").read_text().splitlines()]
     (files / "yx_geo.csv").write_text("".join(",".join([r[0], r[2], r[1], *r[3:]]) + "\n" for r in rows))
     reading = read_project(
-        request(files, positions=str(files / "yx_geo.csv"), control=str(files / "yx.csv"), axes="yx")
+        request(files, positions=str(files / "yx_geo.csv"), control=str(files / "yx.csv"), stated=Statements(axes="yx"))
     )
     sample = oriented_sample(shift=UTM).block
     np.testing.assert_allclose(reading.block.control.xyz, sample.control.xyz, rtol=0, atol=5.1e-7)
@@ -315,7 +315,7 @@ STRANGE = {
     "folder": ({"control": "patb"}, "patb: is"),
     "check": ({"control": "gcp.csv", "check": ("t1",)}, "--check t1: there is no such control point"),
     "shift": ({"gnss_shift": "on"}, "--gnss-shift 'on' is not possible"),
-    "axes": ({"axes": "zy"}, "--axes 'zy' is not possible"),
+    "axes": ({"stated": Statements(axes="zy")}, "--axes 'zy' is not possible"),
     "two sigmas": ({"image_sigma_um": 1.0, "image_sigma_px": 1.0}, "exclude each other"),
     "offset": ({"orientation": "opk.txt", "offset": "shift.xyz"}, "is not an orientation of Pix4D"),
     "prefix": ({"stated": Statements(control_prefix="t")}, "--control-prefix is given, but no control points"),
@@ -421,7 +421,7 @@ def test_ellipsoidal_heights(shared_data):
     assert np.isnan(found[1, 2])
     with pytest.raises(InputError, match="no plan position"):
         from_ellipsoidal_heights(np.array([[np.nan, np.nan, 5.0]]), "EPSG:2154+5720", geoid)
-    assert horizontal_part("EPSG:2154+5720") == "EPSG:2154"
+    assert plan_of("EPSG:2154+5720") == "EPSG:2154"
 
 
 def test_true_heights_against_the_scale_of_the_projection():

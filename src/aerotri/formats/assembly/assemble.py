@@ -34,11 +34,14 @@ class Statements:
     control_sigma_m, positions_sigma_m : (X, Y, Z), for points and photographs without their own.
     orientation_sigma_m, orientation_sigma_deg : (X, Y, Z) and (ω, φ, κ), where orientations are to be observations
         beside start values; None: they are not.
-    control_prefix : stands before the names of control points in the files of image points.
+    control_prefix : stands before the names of control points in the files of image points, or in their own list.
     control_heights : 'crs', or 'ellipsoidal' where the list has those and the block others.
     linear_alteration_m : mean height of the ground where heights of orientations are corrected for the scale of the
         projection; None where they are not.
     patb_rotation : meaning of the matrices of an .ori file, see `patb.ROTATIONS`.
+    axes : 'xy' or 'yx', the order of coordinates in lists that do not name them; None: as the system has them.
+    columns : of such a list, see `named_lists.stated_columns`: of the control points, of positions where there are
+        none.
     """
 
     crs: str = ""
@@ -51,6 +54,8 @@ class Statements:
     control_heights: str = "crs"
     linear_alteration_m: float | None = None
     patb_rotation: str | None = None
+    axes: str | None = None
+    columns: str = ""
 
 
 def with_crs(reading: Reading, crs: str, geoid: FilePath | None = None) -> Reading:
@@ -286,9 +291,11 @@ def with_positions(reading: Reading, given: PositionList, stated: Statements) ->
     xyz = given.xyz[rows]
     if given.crs:
         refuse_local(block, given.crs, given.path)
-        xyz = placing.to_crs(xyz, given.crs, block.crs, stated.geoid)
-    placing.refuse_exchanged_axes(block.control.xyz, xyz, given.path)
-    placing.refuse_exchanged_axes(xyz, block.images.centre, given.path)
+        near = np.vstack([block.control.xyz, block.images.centre])
+        xyz = placing.near_in_crs(xyz, given.crs, block.crs, stated.geoid, near, given.path)
+    placing.refuse_heights(given.images[rows], xyz[:, 2], block.crs, placing.HIGHEST_FLIGHT_M, given.path)
+    placing.refuse_far_off(block.control.xyz, xyz, given.path)
+    placing.refuse_far_off(xyz, block.images.centre, given.path)
     sigma = given_or_stated(given.sigma[rows], stated.positions_sigma_m, given.path, "--positions-sigma-m")
     unknown = no_sigma(len(rows))
     observed = GnssIns(image, xyz, sigma, unknown, unknown, unknown[:, 0])

@@ -12,7 +12,7 @@ from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.assemble import Statements, given_or_stated, padded, refuse_local
 from aerotri.formats.assembly.parts import PointList, Reading, no_sigma
 from aerotri.observations import Block, Control
-from aerotri.observations.names import in_words, prefix_of, quoted
+from aerotri.observations.names import in_words, prefix_of, quoted, under_prefix
 
 HEIGHTS = ("crs", "ellipsoidal")
 
@@ -32,8 +32,8 @@ def with_control(reading: Reading, given: PointList, stated: Statements, may_be_
     block = reading.block
     if not len(given.points):
         raise InputError("holds no points", "give a row for every point", given.path)
-    names = np.array([stated.control_prefix + name for name in given.points.tolist()], dtype=str)
     place = {name: i for i, name in enumerate(block.points.tolist())}
+    names = np.array([under_prefix(name, stated.control_prefix, place) for name in given.points.tolist()], dtype=str)
     measured = np.array([name in place for name in names.tolist()], bool)
     if len(block.image_points) and not measured.any() and not may_be_unmeasured:
         others = block.points.astype(str).tolist()
@@ -56,10 +56,12 @@ def with_control(reading: Reading, given: PointList, stated: Statements, may_be_
     if twice.any():
         message = f"point '{names[np.flatnonzero(twice)[0]]}' has coordinates already, from another file"
         raise InputError(message, "keep the row in one of the files", given.path)
-    xyz, said = _in_block(block, given, stated)
-    messages += said
     observed = no_sigma(0) if block.gnss_ins is None else block.gnss_ins.xyz
-    placing.refuse_exchanged_axes(xyz, np.vstack([block.images.centre, observed]), given.path)
+    flown = np.vstack([block.images.centre, observed])
+    xyz, said = _in_block(block, given, stated, flown)
+    messages += said
+    placing.refuse_heights(names, xyz[:, 2], block.crs, placing.HIGHEST_GROUND_M, given.path)
+    placing.refuse_far_off(xyz[measured] if measured.any() else xyz, flown, given.path)
     known = np.isfinite(xyz)
     sigma = np.where(known, given.sigma, 1.0)
     sigma = np.where(known, given_or_stated(sigma, stated.control_sigma_m, given.path, "--control-sigma-m"), np.nan)
@@ -74,15 +76,17 @@ def with_control(reading: Reading, given: PointList, stated: Statements, may_be_
     return Reading(replace(block, points=points, control=both), start, tuple(messages))
 
 
-def _in_block(block: Block, given: PointList, stated: Statements) -> tuple[np.ndarray, list[str]]:
-    """(k, 3) coordinates in the block's CRS, and what to say of it."""
+def _in_block(
+    block: Block, given: PointList, stated: Statements, flown: np.ndarray
+) -> tuple[np.ndarray, list[str]]:  # fmt: skip
+    """(k, 3) coordinates in the block's CRS, and what to say of it; flown (n, 3) m, where the photographs are."""
     if stated.control_heights not in HEIGHTS:
         raise InputError(
             f"--control-heights '{stated.control_heights}' is not possible", f"give {' or '.join(HEIGHTS)}"
         )
     if given.crs:
         refuse_local(block, given.crs, given.path)
-        return placing.to_crs(given.xyz, given.crs, block.crs, stated.geoid), []
+        return placing.near_in_crs(given.xyz, given.crs, block.crs, stated.geoid, flown, given.path), []
     if "ellipsoidal" in (stated.control_heights, given.heights) and "+" in block.crs:
         xyz = placing.from_ellipsoidal_heights(given.xyz, block.crs, stated.geoid)
         return xyz, [f"{given.path.name}: ellipsoidal heights were brought to those of {block.crs}"]
@@ -116,7 +120,7 @@ def block_with_check_points(block: Block, names: Sequence[str], prefix: str = ""
     control = block.points[block.control.point]
     is_check = block.control.is_check.copy()
     for name in names:
-        own = np.flatnonzero((control == name) | (control == prefix + name))
+        own = np.flatnonzero(np.isin(control, [name, prefix + name, name.removeprefix(prefix)]))
         if not len(own):
             known = ", ".join(control[:8].tolist())
             raise InputError(f"--check {name}: there is no such control point", f"known are {known}")

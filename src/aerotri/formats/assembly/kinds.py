@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from aerotri.conventions import InputError, regular_file
+from aerotri.formats.assembly.assemble import Statements
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, RayList
 from aerotri.formats.foreign.bingo import is_bingo, read_bingo
 from aerotri.formats.foreign.ign import is_ign_app, is_ign_mes, is_ign_opk, read_ign_app, read_ign_mes, read_ign_opk
@@ -20,6 +21,7 @@ from aerotri.formats.foreign.named_lists import (
     read_control_list,
     read_named_orientations,
     read_positions,
+    stated_columns,
 )
 from aerotri.formats.foreign.odm import is_odm_gcp, is_odm_geo, read_odm_gcp, read_odm_geo
 from aerotri.formats.foreign.orientation_list import is_orientation_list, read_orientation_list
@@ -49,14 +51,18 @@ class ReadingOptions:
 
     Parameters
     ----------
-    axes : 'xy' or 'yx', the order of coordinates in lists of Pix4D.
+    axes : 'xy' or 'yx', the order of coordinates in lists that do not name them.
+    exchanged : whether the user says that X and Y stand in the other order where a list has a usual one.
     offset : (3,) m, added to orientations of Pix4D; None: nothing.
     patb_rotation : see `patb.ROTATIONS`; None: settled by reprojection.
+    columns : of a list that does not name them, see `named_lists.stated_columns`; '' where it does.
     """
 
     axes: str = "xy"
+    exchanged: bool = False
     offset: np.ndarray | None = None
     patb_rotation: str | None = None
+    columns: str = ""
 
     def __post_init__(self) -> None:
         if self.axes not in AXES:
@@ -65,6 +71,11 @@ class ReadingOptions:
             raise InputError(
                 f"--patb-rotation '{self.patb_rotation}' is not possible", f"give {' or '.join(ROTATIONS)}"
             )
+        stated_columns(self.columns)
+
+    def beside_control(self) -> ReadingOptions:
+        """For a list of positions where there is one of control, whose columns these are."""
+        return replace(self, columns="", exchanged=False)
 
 
 Kinds = Mapping[str, tuple[Callable[[Path], bool], Callable[[Path, ReadingOptions], Any]]]
@@ -83,13 +94,13 @@ ORIENTATIONS: Kinds = {
     "opk-csv": (is_named_orientations, lambda path, _: read_named_orientations(path)),
 }
 POSITIONS: Kinds = {
-    "odm-geo": (is_odm_geo, lambda path, _: read_odm_geo(path)),
-    "csv": (is_named_list, lambda path, _: read_positions(path)),
+    "odm-geo": (is_odm_geo, lambda path, options: read_odm_geo(path, options.exchanged)),
+    "csv": (is_named_list, lambda path, options: read_positions(path, options.columns)),
     "pix4d-geo": (is_pix4d_geo, lambda path, options: read_pix4d_geo(path, options.axes)),
 }
 CONTROL: Kinds = {
-    "odm-gcp": (is_odm_gcp, lambda path, _: read_odm_gcp(path)),
-    "csv": (is_named_list, lambda path, _: read_control_list(path)),
+    "odm-gcp": (is_odm_gcp, lambda path, options: read_odm_gcp(path, options.exchanged)),
+    "csv": (is_named_list, lambda path, options: read_control_list(path, options.columns)),
     "pix4d-gcp": (is_pix4d_gcp, lambda path, options: read_pix4d_gcp(path, options.axes)),
     "ign-app": (is_ign_app, lambda path, _: read_ign_app(path)),
     "patb-con": (is_patb_con, lambda path, _: read_patb_con(path)),
@@ -119,14 +130,15 @@ def kind_of(path: Path, kinds: Kinds) -> str | None:
 
 def _read(text: str, kinds: Kinds, what: str, options: ReadingOptions) -> Any:
     stated, path = split_kind(text, kinds)
-    kind = kind_of(path, kinds) if stated is None else stated
+    kind = stated or ("csv" if options.columns and "csv" in kinds else kind_of(path, kinds))
     if kinds is ORIENTATIONS and kind != "pix4d-eo" and options.offset is not None:
         raise InputError("is not an orientation of Pix4D; --offset is only for these", "leave --offset out", path)
     if kind is None:
         known = ", ".join(kinds)
+        more = "; or add a first row that names the columns, or state them with --columns" if "csv" in kinds else ""
         raise InputError(
             f"is not in a known format of {what}",
-            f"known are {known}; put the format before the path, as {next(iter(kinds))}:{path.name}",
+            f"known are {known}; put the format before the path, as {next(iter(kinds))}:{path.name}{more}",
             path,
         )
     if path.is_dir():
@@ -172,6 +184,18 @@ def read_control(text: str, options: ReadingOptions) -> PointList:
     InputError
     """
     return _read(text, CONTROL, "control points", options)
+
+
+def options_of(stated: Statements, offset: np.ndarray | None = None) -> ReadingOptions:
+    """What the user states of lists, with the order of axes that the coordinate system has where he does not.
+
+    Raises
+    ------
+    InputError
+        When what is stated makes no sense.
+    """
+    axes = axes_of(stated.crs) if stated.axes is None else stated.axes
+    return ReadingOptions(axes, stated.axes == "yx", offset, stated.patb_rotation, stated.columns)
 
 
 def axes_of(crs: str) -> str:

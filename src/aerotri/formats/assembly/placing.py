@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +11,18 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates import local_frame
 from aerotri.coordinates.blocks import frame_of_block, transform_block
-from aerotri.coordinates.georeference import CRS_PATTERN, CRS_REMEDY, Georeference, georeference
+from aerotri.coordinates.georeference import (
+    CRS_PATTERN,
+    CRS_REMEDY,
+    Georeference,
+    georeference,
+    is_projected,
+    utm_on_datum,
+)
 from aerotri.coordinates.local_frame import LocalFrame, topocentric_frame
+from aerotri.crs_text import plan_of, system_in_words
 from aerotri.formats.assembly.oriented import OrientedBlock
-from aerotri.formats.assembly.parts import Reading
+from aerotri.formats.assembly.parts import PointList, PositionList, Reading
 from aerotri.formats.foreign.ign import without_linear_alteration
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 
@@ -21,17 +30,16 @@ NORTH_STEP_DEG = 1e-5
 """Half the length of the piece of meridian that gives the direction of north in a grid: 1 m."""
 BODY = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """Between x forward, y right, z down and x right, y forward, z up; its own inverse."""
-FAR_M = 1e4
-"""Distance, m, of points from the photographs from which exchanged axes are suspected; chosen [C]: below the
-differences of X and Y in most systems, beyond the way from a block to its control points."""
+FAR_M, FAR_SIZES = 1e4, 3.0
+"""Distance of points from the photographs, in m and in sizes of the larger area, beyond which both are not in one
+system; chosen [C]: below the differences of X and Y in most systems, beyond the way from a block to its control."""
+HIGHEST_GROUND_M, HIGHEST_FLIGHT_M = 1e4, 3e4
+"""Heights beyond these are none of ground and of an aircraft [C]."""
+OTHER_SYSTEM = "are both in the same coordinate system? correct the one that the list names, or state it: --crs"
+OTHER_AXES = "state the order of the axes: --axes yx (or xy)"
 NEARER = 0.1
 """Share of that distance which exchanging X and Y has to leave; chosen [C]: chance does not bring points ten times
 nearer."""
-
-
-def horizontal_part(crs: str) -> str:
-    """The CRS without its height system."""
-    return crs.partition("+")[0]
 
 
 def known_crs(crs: str) -> str:
@@ -44,10 +52,33 @@ def known_crs(crs: str) -> str:
     """
     if crs in ("", "local"):
         return crs
-    georeference(horizontal_part(crs), np.zeros((0, 3)))
+    georeference(plan_of(crs), np.zeros((0, 3)))
     if not CRS_PATTERN.fullmatch(crs):
         raise InputError(f"crs '{crs}' is not understood", CRS_REMEDY)
     return crs.upper()
+
+
+def system_of_lists(lists: Sequence[PointList | PositionList]) -> str:
+    """The system that a block gets from lists: the first that counts in metres, else UTM; '' where none names one."""
+    told = [part for part in lists if part.crs]
+    metric = [part for part in told if is_projected(plan_of(part.crs))]
+    return system_of_block(first.crs, first.xyz) if (first := next(iter(metric or told), None)) is not None else ""
+
+
+def system_of_block(crs: str, xyz: np.ndarray) -> str:
+    """The system that a block gets from coordinates: their own, or the UTM zone on their datum.
+
+    UTM is taken where their system has no code, or counts in degrees.
+
+    Parameters
+    ----------
+    crs : of the coordinates. xyz : (n, 3) in it, NaN where unknown.
+    """
+    known = xyz[np.isfinite(xyz[:, :2]).all(axis=1)]
+    if not len(known) or (CRS_PATTERN.fullmatch(crs) and is_projected(plan_of(crs))):
+        return crs
+    lon, lat, _ = georeference(crs, known).to_geographic(np.nan_to_num(known)).mean(axis=0)
+    return utm_on_datum(crs, float(lon), float(lat))
 
 
 def to_crs(xyz: np.ndarray, source: str, target: str, geoid: FilePath | None) -> np.ndarray:
@@ -67,15 +98,15 @@ def to_crs(xyz: np.ndarray, source: str, target: str, geoid: FilePath | None) ->
         return xyz
     plan = np.isfinite(xyz[:, :2]).all(axis=1)
     if not plan.all():
-        message = f"a point in {source} has no plan position and cannot be brought to {target}"
+        message = f"a point in {system_in_words(source)} has no plan position and cannot be brought to {target}"
         raise InputError(message, f"give it in {target}")
     known = np.isfinite(xyz[:, 2])
-    here, plain = georeference(source, xyz), georeference(horizontal_part(target), xyz)
+    here, plain = georeference(source, xyz), georeference(plan_of(target), xyz)
     geographic = here.to_geographic(np.where(np.isnan(xyz), 0.0, xyz))
     there = georeference(target, plain.from_geographic(geographic), geoid)
     if _datum(here) != _datum(there):
         remedy = f"transform the coordinates to {target} beforehand"
-        raise InputError(f"{source} and {target} are on different datums", remedy)
+        raise InputError(f"{system_in_words(source)} and {target} are on different datums", remedy)
     found = there.from_geographic(geographic)
     return np.column_stack([found[:, :2], np.where(known, found[:, 2], np.nan)])
 
@@ -103,7 +134,7 @@ def from_ellipsoidal_heights(xyz: np.ndarray, crs: str, geoid: FilePath | None) 
     if not known.any():
         return xyz
     found = xyz.copy()
-    plain = georeference(horizontal_part(crs), xyz[known])
+    plain = georeference(plan_of(crs), xyz[known])
     reference = georeference(crs, xyz[known], geoid)
     found[known, 2] = reference.from_geographic(plain.to_geographic(xyz[known]))[:, 2]
     return found
@@ -126,7 +157,7 @@ def rotation_from_yaw_pitch_roll(angles: np.ndarray, xyz: np.ndarray, crs: str) 
     """
     yaw, pitch, roll = np.asarray(angles, dtype=float).T
     aircraft = _about(2, yaw) @ _about(1, pitch) @ _about(0, roll)
-    reference = georeference(horizontal_part(crs), xyz)
+    reference = georeference(plan_of(crs), xyz)
     convergence = np.zeros(len(xyz))
     if reference.is_projected:
         place = reference.to_geographic(np.asarray(xyz, dtype=float))
@@ -153,7 +184,7 @@ def true_heights(centre: np.ndarray, crs: str, ground: float) -> np.ndarray:
     ----------
     centre : (n, 3) in `crs`. ground : m, mean height of the ground.
     """
-    frame = local_frame(horizontal_part(crs), centre)
+    frame = local_frame(plan_of(crs), centre)
     on_ellipsoid = np.column_stack([centre[:, :2], np.zeros(len(centre))])
     plan = frame.crs_per_local(frame.to_local(on_ellipsoid))[:, :2, :2]
     scale = np.sqrt(np.abs(np.linalg.det(plan)))
@@ -225,8 +256,8 @@ def in_axes_at(oriented: OrientedBlock, origin: np.ndarray, geoid: FilePath | No
     return _in_frame(oriented, topocentric_frame(oriented.block.crs, origin, geoid))
 
 
-def refuse_exchanged_axes(points: np.ndarray, photographs: np.ndarray, file: os.PathLike[str]) -> None:
-    """Refuse coordinates that lie far from the photographs, and near them once X and Y change places.
+def refuse_far_off(points: np.ndarray, photographs: np.ndarray, file: os.PathLike[str]) -> None:
+    """Refuse coordinates that lie far from the photographs: in another system, or with X and Y exchanged.
 
     Parameters
     ----------
@@ -236,12 +267,80 @@ def refuse_exchanged_axes(points: np.ndarray, photographs: np.ndarray, file: os.
     ------
     InputError
     """
-    one = points[np.isfinite(points[:, :2]).all(axis=1), :2]
-    other = photographs[np.isfinite(photographs[:, :2]).all(axis=1), :2]
+    one, other = _plan(points), _plan(photographs)
     if not len(one) or not len(other):
         return
-    place, near = np.median(one, axis=0), np.median(other, axis=0)
-    apart, exchanged = np.linalg.norm(place - near), np.linalg.norm(place[::-1] - near)
-    if apart > FAR_M and exchanged < NEARER * apart:
-        message = f"lies {apart / 1e3:.0f} km from the photographs, {exchanged / 1e3:.3g} km with X and Y exchanged"
-        raise InputError(message, "state the order of the axes: --axes yx (or xy)", file)
+    apart, exchanged = _apart(one, other), _apart(one[:, ::-1], other)
+    size = max(float(np.ptp(xy, axis=0).max()) for xy in (one, other))
+    if apart <= max(FAR_M, FAR_SIZES * size):
+        return
+    message, remedy = f"lies {apart / 1e3:.3g} km from the photographs", OTHER_SYSTEM
+    if exchanged < NEARER * apart:
+        message, remedy = f"{message}, {exchanged / 1e3:.3g} km with X and Y exchanged", OTHER_AXES
+    raise InputError(message, remedy, file)
+
+
+def refuse_heights(names: np.ndarray, heights: np.ndarray, crs: str, highest: float, file: os.PathLike[str]) -> None:
+    """Refuse heights that nothing on earth has; those of local coordinates may count from anywhere.
+
+    Parameters
+    ----------
+    names : (n,) of points or photographs. heights : (n,) m, NaN where unknown. highest : m.
+
+    Raises
+    ------
+    InputError
+    """
+    wrong = np.flatnonzero(np.abs(np.nan_to_num(heights)) > highest)
+    if crs != "local" and len(wrong):
+        message = f"the height of '{names[wrong[0]]}' would be {heights[wrong[0]]:.0f} m"
+        raise InputError(message, "give heights in metres: are these in millimetres?", file)
+
+
+def near_in_crs(
+    xyz: np.ndarray, source: str, target: str, geoid: FilePath | None, photographs: np.ndarray, file: os.PathLike[str]
+) -> np.ndarray:
+    """As `to_crs`, of points that lie near the photographs; longitude and latitude may be exchanged.
+
+    Parameters
+    ----------
+    photographs : (n, 3) m in `target`, NaN where unknown. file : that the points are from.
+
+    Raises
+    ------
+    InputError
+        When they lie elsewhere, and whether they would not with the axes exchanged.
+    """
+    if not is_projected(plan_of(source)) and _is_near_exchanged(xyz, source, target, geoid, photographs):
+        message = "lies near the photographs with longitude and latitude exchanged, not as it stands"
+        raise InputError(message, OTHER_AXES, file)
+    try:
+        return to_crs(xyz, source, target, geoid)
+    except InputError as error:
+        raise InputError(error.message, error.remedy, file) from error
+
+
+def _is_near_exchanged(
+    lon_lat: np.ndarray, source: str, target: str, geoid: FilePath | None, photographs: np.ndarray
+) -> bool:
+    """Whether points in degrees lie near the photographs only where longitude and latitude change places."""
+    near = []
+    for order in ([0, 1, 2], [1, 0, 2]):
+        try:
+            near.append(_are_near(to_crs(lon_lat[:, order], source, target, geoid), photographs))
+        except InputError:
+            near.append(False)
+    return near[1] and not near[0]
+
+
+def _are_near(points: np.ndarray, photographs: np.ndarray) -> bool:
+    one, other = _plan(points), _plan(photographs)
+    return bool(len(one)) and bool(len(other)) and _apart(one, other) <= FAR_M
+
+
+def _plan(xyz: np.ndarray) -> np.ndarray:
+    return xyz[np.isfinite(xyz[:, :2]).all(axis=1), :2]
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> float:
+    return float(np.linalg.norm(np.median(one, axis=0) - np.median(other, axis=0)))

@@ -14,13 +14,21 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted
 from aerotri.coordinates.blocks import frame_of_block, transform_block
+from aerotri.diagnosis.suspicions import suspicions_of_lists
 from aerotri.formats import convert
-from aerotri.formats.assembly import kinds
+from aerotri.formats.assembly import kinds, placing
 from aerotri.formats.assembly.assemble import Statements, with_crs, with_orientations, with_positions, with_rays
 from aerotri.formats.assembly.assemble_control import with_check_points, with_control
 from aerotri.formats.assembly.camera_spec import CameraSpec, camera_of_each, cameras_of, freed
 from aerotri.formats.assembly.kinds import ReadingOptions
-from aerotri.formats.assembly.parts import OrientationList, PointList, RayList, Reading, no_sigma
+from aerotri.formats.assembly.parts import (
+    OrientationList,
+    PointList,
+    PositionList,
+    RayList,
+    Reading,
+    no_sigma,
+)
 from aerotri.formats.assembly.reprojection import FEWEST, control_at_start, residuals_at_start, sample_of_points
 from aerotri.formats.assembly.rigs_by_name import names_told, with_rig
 from aerotri.formats.block.folder import read_block
@@ -28,6 +36,7 @@ from aerotri.formats.foreign.bundler import read_bundler
 from aerotri.formats.foreign.colmap import read_colmap
 from aerotri.formats.foreign.ign import files_of, is_ign, is_ign_camera, read_ign_app, read_ign_camera, read_ign_mes
 from aerotri.formats.foreign.metashape_project import read_metashape_project
+from aerotri.formats.foreign.named_lists import has_attitudes
 from aerotri.formats.foreign.opensfm import read_opensfm
 from aerotri.formats.foreign.pix4d import read_pix4d_offset
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images
@@ -50,7 +59,7 @@ class Request:
     source : PATH or kind:PATH; name : of the block.
     image_points, orientation, positions, control : further files, PATH or kind:PATH, '' for none.
     camera, stated : see there. check : control points that become check points.
-    axes, offset, patb_rotation : see `kinds.ReadingOptions`; offset is a file.
+    offset : file with what is added to orientations of Pix4D.
     image_sigma_um, image_sigma_px : standard deviation of the image points; None: that of the source, or a pixel.
     gnss_shift : 'off', 'block' or 'strip'; None: as the settings are.
     station_pattern, rig_reference : see `rigs_by_name.with_rig`; '' for no rig.
@@ -65,7 +74,6 @@ class Request:
     camera: CameraSpec = field(default_factory=CameraSpec)
     stated: Statements = field(default_factory=Statements)
     check: tuple[str, ...] = ()
-    axes: str | None = None
     offset: FilePath | None = None
     image_sigma_um: float | None = None
     image_sigma_px: float | None = None
@@ -84,6 +92,7 @@ class _Parts:
     cameras: tuple[Camera, ...] = ()
     messages: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
+    positions: PositionList | None = None
 
 
 def read_project(request: Request) -> Reading:
@@ -124,9 +133,10 @@ def assembled(request: Request, sources: Sources) -> Reading:
     parts = _Parts() if whole is not None else _parts(request, options, sources)
     reading = whole if whole is not None else _begin(request, parts)
     control = [*parts.control, *([kinds.read_control(request.control, options)] if request.control else [])]
-    positions = kinds.read_position_list(request.positions, options) if request.positions else None
-    told = [part.crs for part in (*control, *([positions] if positions else [])) if part.crs]
-    crs = request.stated.crs or (told[0] if told and reading.block.crs == "local" else "")
+    positions = _positions(request, options, parts)
+    crs = request.stated.crs
+    if not crs and reading.block.crs == "local":
+        crs = placing.system_of_lists([*control, *([positions] if positions else [])])
     reading = with_crs(reading, crs, request.stated.geoid)
     extra = [kinds.read_rays(text, options) for text in request.image_points]
     of_control = [part.rays for part in control if part.rays is not None and part.rays.path not in parts.files]
@@ -148,6 +158,14 @@ def assembled(request: Request, sources: Sources) -> Reading:
     return _finished(reading, request, whole is None)
 
 
+def _positions(request: Request, options: ReadingOptions, parts: _Parts) -> PositionList | None:
+    """The positions of a list, or of the source."""
+    if not request.positions:
+        return parts.positions
+    own = options.beside_control() if request.control else options
+    return kinds.read_position_list(request.positions, own)
+
+
 def _on_rig(reading: Reading, request: Request) -> Reading:
     try:
         return with_rig(reading, request.station_pattern, request.rig_reference)
@@ -166,10 +184,11 @@ def reading_options(request: Request) -> ReadingOptions:
     offset = None if request.offset is None else read_pix4d_offset(request.offset)
     if request.rig_reference and not request.station_pattern:
         raise InputError("--rig-reference is given, but no rig", "say how names tell it: --station-pattern PATTERN")
+    if request.stated.columns and not (request.control or request.positions):
+        raise InputError("--columns is given, but no list of points", "give it: --control FILE, or --positions FILE")
     if not request.control and request.stated.control_prefix:
         raise InputError("--control-prefix is given, but no control points", "give them: --control FILE")
-    axes = kinds.axes_of(request.stated.crs) if request.axes is None else request.axes
-    return ReadingOptions(axes, offset, request.stated.patb_rotation)
+    return kinds.options_of(request.stated, offset)
 
 
 def _whole(request: Request, sources: Sources) -> Reading | None:
@@ -245,6 +264,8 @@ def _parts(request: Request, options: ReadingOptions, sources: Sources) -> _Part
         return _Parts((sources.rays(kind, path, options),))
     if kind in kinds.ORIENTATIONS:
         return _Parts(orientations=kinds.read_orientations(f"{kind}:{path}", options))
+    if has_attitudes(path) and not request.positions:
+        return _Parts(positions=kinds.read_position_list(f"csv:{path}", options))
     known = ", ".join((*convert.RECOGNISERS, *FOLDERS, *kinds.RAYS, *kinds.ORIENTATIONS))
     raise InputError(
         "is of no known format", f"known are {known}; put the format before the path, as FORMAT:{path.name}", path
@@ -289,6 +310,8 @@ def _begin(request: Request, parts: _Parts) -> Reading:
     for part in (*parts.rays, *([parts.orientations] if parts.orientations is not None else [])):
         for image, camera in zip(part.images.tolist(), part.cameras.tolist(), strict=True):
             camera_of[image] = camera_of.get(image) or camera
+    if parts.positions is not None:
+        camera_of |= dict.fromkeys(parts.positions.images.tolist(), "")
     if not camera_of:
         raise InputError(
             "holds no photographs",
@@ -354,7 +377,7 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
             "--gnss-shift off leaves it out"
         )
     block = replace(block, settings=settings, image_points=replace(rays, sigma=sigma))
-    messages += fit_of_start_values(block, request.stated.geoid)
+    messages += [*suspicions_of_lists(block), *fit_of_start_values(block, request.stated.geoid)]
     return replace(reading, block=block, messages=tuple(messages))
 
 

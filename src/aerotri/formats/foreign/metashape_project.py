@@ -17,6 +17,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError, counted, mm_from_px
 from aerotri.coordinates.georeference import georeference, is_projected, utm_on_datum
 from aerotri.coordinates.local_frame import topocentric_frame
+from aerotri.crs_text import plan_of
 from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.parts import Reading, no_sigma, texts
 from aerotri.formats.foreign.colmap_model import is_free
@@ -318,12 +319,12 @@ def _moved(reading: Reading, chunk: Element, crs: str, path: Path) -> Reading:
     if crs != "local":
         there = np.isfinite(block.images.centre).all(axis=1)
         middle = block.images.centre[there].mean(axis=0) if there.any() else np.zeros(3)
-        plain = georeference(placing.horizontal_part(crs), np.zeros((0, 3)))
+        plain = georeference(plan_of(crs), np.zeros((0, 3)))
         lon, lat, height = plain.from_geocentric((translation + scale * rotation @ middle)[None])[0].tolist()
         if not np.isfinite([lon, lat, height]).all() or abs(height) > HIGHEST_M:
             raise InputError("its chunk does not lie on the earth", "georeference it, or make its system local", path)
         origin = (lon, lat, height)
-        frame = topocentric_frame(placing.horizontal_part(crs), np.array(origin))
+        frame = topocentric_frame(plan_of(crs), np.array(origin))
         turn = frame.local_from_geocentric
         rotation, translation = turn @ rotation, turn @ (translation - frame.origin_geocentric)
     turned = rotation @ rotation_from_angles(block.images.angles, block.rotation)
@@ -360,12 +361,12 @@ def _with_reference(
     referenced = len(rows) > 0 or len(known) > 0
     if crs != "local":
         target = crs
-        if not is_projected(placing.horizontal_part(crs)):
+        if not is_projected(plan_of(crs)):
             places = np.vstack([xyz, known])
             at = reading.origin or (tuple(np.nanmean(places, axis=0)[:2]) if len(places) else None)
             if at is None:
                 return replace(reading, messages=(*messages, "nothing says where the chunk lies"))
-            target = utm_on_datum(placing.horizontal_part(crs), float(at[0]), float(at[1]))
+            target = utm_on_datum(plan_of(crs), float(at[0]), float(at[1]))
             messages.append(f"coordinates in degrees ({crs}) were brought to {target}, heights are ellipsoidal")
         if reading.origin is not None:
             reading = placing.in_crs(reading, target)

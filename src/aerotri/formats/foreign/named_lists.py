@@ -1,226 +1,385 @@
-"""Lists whose first row names the columns: positions, control points or orientations, as many programs write them.
+"""Lists whose columns are known by their names: positions, control points or orientations, as many programs write them.
 
-The columns are known by their names, whatever their order: Northing before Easting, ``X_acc`` or ``AccHor``, units in
-brackets. Cells are separated by commas, semicolons or tabs. Longitude and latitude make the list one of EPSG:4326.
+The names stand in the first row, in a comment above the rows (Metashape), or are stated by the user (``PNEZD``). Their
+order does not matter, and units in brackets are brought to metres and degrees. Cells are separated by commas,
+semicolons, tabs or blanks; where commas do not separate, they may stand in numbers. Longitude and latitude make the
+list one of EPSG:4326, unless a comment or a column names its coordinate system.
 """
 
 from __future__ import annotations
 
+import csv
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.coordinates.stated_systems import REMEDY, StatedSystem, stated_system
+from aerotri.crs_text import plan_of
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, texts
+from aerotri.formats.text.list_columns import ListColumn, is_unit, list_column
 from aerotri.formats.text.tables import LONGEST_NAME, SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, first_lines
 from aerotri.functional_model.rotation import rotation_from_angles
 
 GEOGRAPHIC = "EPSG:4326"
-MEANINGS: dict[str, tuple[str, ...]] = {
-    "name": (
-        "imagename", "image", "filename", "file", "photo", "photoid", "photoname", "label", "name", "id", "point",
-        "pointid", "pointname", "gcp", "gcpname", "gcplabel", "target", "marker",
-    ),
-    "X": ("x", "xgps", "x0", "easting", "east", "e", "xeasting"),
-    "Y": ("y", "ygps", "y0", "northing", "north", "n", "ynorthing"),
-    "Z": (
-        "z", "zgps", "z0", "height", "h", "altitude", "alt", "elevation", "elev", "ellipsoidalheight", "ellheight",
-        "orthometricheight",
-    ),
-    "lon": ("longitude", "lon", "long", "lng"),
-    "lat": ("latitude", "lat"),
-    "sX": ("sx", "xacc", "accx", "xaccuracy", "accuracyx", "sigmax", "stdx", "sdx", "sx0", "sigmae", "se"),
-    "sY": ("sy", "yacc", "accy", "yaccuracy", "accuracyy", "sigmay", "stdy", "sdy", "sy0", "sigman", "sn"),
-    "sZ": ("sz", "zacc", "accz", "zaccuracy", "accuracyz", "sigmaz", "stdz", "sdz", "sz0", "sigmah", "sigmau"),
-    "s_plan": ("acchor", "horacc", "hacc", "acch", "accuracyh", "horizontalaccuracy", "accuracyhorizontal", "sxy"),
-    "s_height": ("accver", "veracc", "vacc", "accv", "accuracyv", "verticalaccuracy", "accuracyvertical", "sh"),
-    "s_all": ("accuracy", "acc", "sxyz", "sigma"),
-    "omega": ("omega",),
-    "phi": ("phi",),
-    "kappa": ("kappa",),
-    "yaw": ("yaw", "heading"),
-    "pitch": ("pitch",),
-    "roll": ("roll",),
-    "role": ("role",),
-}  # fmt: skip
-ELLIPSOIDAL = ("ellipsoidalheight", "ellheight")
 MOST_COLUMNS = 1000
 """Columns of a list at most; chosen [C]: no program writes as many; a file of another kind on one long line would."""
-NO_NUMBER = ("", "nan", "NaN", "NAN")
-"""What stands where nothing is known."""
+NO_NUMBER = ("", "nan", "-", "n/a", "none")
+"""What stands where nothing is known, in small letters."""
+OF_SYSTEM = re.compile(r"#\s*(?:coordinate\s*system|crs|srs|projection)\s*[:=]\s*(.+)", re.IGNORECASE)
+OF_TOTALS = re.compile(r"#?\s*\"?total\s+error", re.IGNORECASE)
+LETTERS = {"P": "name", "N": "Y", "E": "X", "Z": "Z", "X": "X", "Y": "Y", "H": "Z", "D": "", "-": ""}
+"""Letters of --columns: point, northing, easting, height, description."""
+COORDINATES = ("X", "Y", "Z", "lon", "lat")
+SIGMAS = ("sX", "sY", "sZ", "s_plan", "s_height", "s_all")
+SEPARATORS = ",;\t|"
+
+
+@dataclass(frozen=True, eq=False)
+class _Header:
+    """The names of the columns: what they hold, what separates the cells, and the line they stand in (None: stated)."""
+
+    columns: tuple[ListColumn, ...]
+    separator: str | None
+    line: int | None
+
+    @property
+    def meanings(self) -> set[str]:
+        return {column.meaning for column in self.columns if column.meaning}
 
 
 @dataclass(frozen=True, eq=False)
 class _List:
-    """Rows of a list: columns by their meaning, names of those without one, and how heights are called."""
+    """Rows of a list: columns by their meaning with factors, the coordinate system, and what to say of the list."""
 
     file: TextFile
+    rows: list[int]
     columns: dict[str, list[str]]
-    unknown: tuple[str, ...]
-    ellipsoidal: bool
-
-    @property
-    def rows(self) -> list[int]:
-        return list(range(1, len(self.file)))
+    header: tuple[ListColumn, ...]
+    system: StatedSystem
+    notes: tuple[str, ...]
 
     def numbers(self, *names: str) -> np.ndarray:
-        """(n, k), NaN where a cell is empty or the column is missing."""
+        """(n, k) in metres or degrees, NaN where a cell is empty or the column is missing."""
         found = np.full((len(self.rows), len(names)), np.nan)
         for k, name in enumerate(names):
-            given = [(i, word) for i, word in enumerate(self.columns.get(name, ())) if word not in NO_NUMBER]
+            given = [(i, word) for i, word in enumerate(self.columns.get(name, ())) if word.lower() not in NO_NUMBER]
             index = [i for i, _ in given]
-            found[index, k] = self.file.values([word for _, word in given], [i + 1 for i in index], name)
+            values = self.file.values([word for _, word in given], [self.rows[i] for i in index], name)
+            found[index, k] = values * self._factor(name)
         return found
 
+    def _factor(self, name: str) -> float:
+        column = next((column for column in self.header if column.meaning == name), None)
+        if column is not None and column.unit and np.isfinite(column.factor):
+            return column.factor
+        if name in ("X", "Y", "sX", "sY", "s_plan"):
+            return self.system.plan_to_metre
+        return self.system.height_to_metre if name in ("Z", "h_ell", "sZ", "s_height") else 1.0
 
-def is_named_list(path: Path) -> bool:
-    """Whether the first row names a column of names and at least two coordinates."""
-    lines = first_lines(path, 1)
-    if not lines:
-        return False
-    found = {meaning for meaning in map(_meaning, lines[0].split(_separator(lines[0]))) if meaning}
-    return "name" in found and len(found & {"X", "Y", "Z", "lon", "lat"}) > 1
+
+def is_named_list(path: Path, columns: str = "") -> bool:
+    """Whether the columns have names, or are stated, among them one of names and at least two coordinates."""
+    header = _header(first_lines(path, 40, comments=False), columns)
+    return header is not None and "name" in header.meanings
 
 
 def is_named_orientations(path: Path) -> bool:
-    """Whether the first row names positions and ω, φ, κ."""
-    lines = first_lines(path, 1)
-    found = [_meaning(word) for word in lines[0].split(_separator(lines[0]))] if lines else []
-    return {"name", "X", "Y", "Z", "omega", "phi", "kappa"} <= set(found)
+    """Whether positions and ω, φ, κ are among the names of the columns."""
+    header = _header(first_lines(path, 40, comments=False))
+    return header is not None and {"name", "X", "Y", "Z", "omega", "phi", "kappa"} <= header.meanings
 
 
-def _separator(header: str) -> str:
-    return max(",;\t", key=header.count)
+def has_attitudes(path: Path) -> bool:
+    """Whether positions, yaw, pitch and roll are among the names of the columns: a list of photographs."""
+    header = _header(first_lines(path, 40, comments=False))
+    return header is not None and {"name", "yaw", "pitch", "roll"} <= header.meanings
 
 
-def _plain(column: str) -> str:
-    """Letters and digits of a column's name, without what stands in brackets."""
-    if len(column) > LONGEST_NAME:
-        return ""
-    return re.sub(r"[^a-z0-9]", "", re.sub(r"[(\[][^)\]]*[)\]]", "", column.lower()))
+def is_named(path: Path) -> bool:
+    """Whether the columns of a list have names, so that they are not known by their number."""
+    return _header(first_lines(path, 40, comments=False)) is not None
 
 
-def _meaning(column: str) -> str | None:
-    plain = _plain(column)
-    return next((meaning for meaning, names in MEANINGS.items() if plain in names), None)
+def stated_columns(text: str) -> tuple[ListColumn, ...]:
+    """The columns that the user states: letters such as PNEZD, or names separated by commas; - for one left out.
+
+    Raises
+    ------
+    InputError
+        When one of them is not known, or there is no name or no coordinate.
+    """
+    if not text:
+        return ()
+    letters = "," not in text and all(letter in LETTERS for letter in text.upper())
+    found = tuple(
+        ListColumn(word, LETTERS[word.upper()]) if letters else list_column(word.strip() if word.strip() != "-" else "")
+        for word in (text if letters else text.split(","))
+    )
+    odd = [column.name for column in found if not letters and column.name and not column.meaning]
+    meanings = {column.meaning for column in found}
+    if odd or "name" not in meanings or len(meanings & set(COORDINATES)) < 2:
+        what = f"'{odd[0][:40]}' is no column" if odd else "no name, or no two coordinates"
+        raise InputError(
+            f"--columns '{text[:80]}': {what}", "write letters such as PNEZD, or names: --columns name,X,Y,Z,sX,sY,sZ"
+        )
+    return found
 
 
-def _read(path: Path) -> _List:
-    file = TextFile(path)
-    if not len(file):
+def _header(lines: Sequence[str], columns: str = "") -> _Header | None:
+    """The names of the columns; None where nothing names two coordinates."""
+    data = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    if columns:
+        first = lines[data] if data < len(lines) else ""
+        return _Header(stated_columns(columns), _separator(first), None)
+    for number in ([data] if data < len(lines) else []) + list(range(data - 1, -1, -1)):
+        line = lines[number].lstrip("# ")
+        separator = _separator(line)
+        found = tuple(map(list_column, cells(line, separator)[: MOST_COLUMNS + 1]))
+        if sum(column.meaning in COORDINATES for column in found) > 1:
+            return _Header(found, separator, number)
+    return None
+
+
+def _separator(line: str) -> str | None:
+    most = max(SEPARATORS, key=line.count)
+    return most if most in line else None
+
+
+def cells(line: str, separator: str | None) -> list[str]:
+    """The cells of a line, quotes taken off; separated by blanks where there is no separator."""
+    if separator is None and '"' not in line:
+        return line.split()
+    words = next(csv.reader([line], delimiter=separator or " ", skipinitialspace=True), [])
+    return [word.strip() for word in words if separator is not None or word]
+
+
+def _read(path: Path, columns: str = "") -> _List:
+    everything = TextFile(path, comments=False, any_letters=True)
+    if not len(everything):
         raise InputError("is empty", "the first row names the columns", path)
-    words = file.words(_separator(file.lines[0]))
-    header = [word.strip('"') for word in words[0]]
-    if len(words[0]) > MOST_COLUMNS or any(len(word) > LONGEST_NAME for word in header):
-        remedy = "the first row names the columns by short texts"
-        raise file.error(0, f"the header has {len(header)} columns, the longest of {max(map(len, header))} characters",
-                         remedy)  # fmt: skip
-    if all_numbers(header[1:]):
-        raise file.error(0, "does not begin with the names of the columns", "add a first row that names them")
-    for row, line in enumerate(words):
-        if len(line) != len(header):
-            message = f"the row has {len(line)} cells, the header has {len(header)}"
-            raise file.error(row, message, "give every row all columns; is the file cut off?")
-    meanings = [_meaning(word) for word in header]
-    for i, meaning in enumerate(meanings):
-        if meaning is not None and meaning in meanings[:i]:
-            first = header[meanings.index(meaning)]
-            raise file.error(0, f"columns '{first}' and '{header[i]}' are both {meaning}", "rename one of them")
-    if "name" not in meanings:
-        raise file.error(0, f"no column holds names: {', '.join(header)}"[:300], "name one of them 'name'")
-    columns = {
-        meaning: [line[i].strip('"') for line in words[1:]] for i, meaning in enumerate(meanings) if meaning is not None
+    header = _header(everything.lines, columns)
+    if header is None:
+        raise everything.error(0, "does not begin with the names of the columns",
+                               "add a first row that names them, or state them with --columns")  # fmt: skip
+    _check_header(everything, header)
+    rows = _rows_below(everything, header)
+    words = {row: cells(everything.lines[row], header.separator) for row in rows}
+    for row in rows:
+        if len(words[row]) != len(header.columns):
+            message = f"the row has {len(words[row])} cells, the header has {len(header.columns)}"
+            raise everything.error(row, message, "give every row all columns; is the file cut off?")
+    if header.separator != ",":
+        words = _with_points(words)
+    by_meaning = {
+        column.meaning: [words[row][i] for row in rows] for i, column in enumerate(header.columns) if column.meaning
     }
-    unknown = tuple(word for word, meaning in zip(header, meanings, strict=True) if meaning is None and word)
-    return _List(file, columns, unknown, any(_plain(word) in ELLIPSOIDAL for word in header))
+    system, notes = _system(everything, header, by_meaning)
+    return _List(everything, rows, by_meaning, header.columns, system, (*everything.notes, *notes))
+
+
+def _check_header(file: TextFile, header: _Header) -> None:
+    row, columns = header.line or 0, header.columns
+    if len(columns) > MOST_COLUMNS or any(len(column.name) > LONGEST_NAME for column in columns):
+        longest = max(len(column.name) for column in columns)
+        message = f"the header has {len(columns)} columns, the longest of {longest} characters"
+        raise file.error(row, message, "the first row names the columns by short texts")
+    if "name" not in header.meanings:
+        names = ", ".join(column.name for column in columns)
+        raise file.error(row, f"no column holds names: {names}"[:300], "name one of them 'name'")
+    seen: dict[str, str] = {}
+    for column in columns:
+        if column.meaning in seen:
+            message = f"columns '{seen[column.meaning]}' and '{column.name}' are both {column.meaning}"
+            raise file.error(row, message, "rename one of them")
+        if column.meaning:
+            seen[column.meaning] = column.name
+        if np.isnan(column.factor) and is_unit(column.unit):
+            message = f"column '{column.name}' cannot be in '{column.unit}'"
+            raise file.error(row, message, "name the column by what it holds, with its unit in brackets")
+
+
+def _rows_below(file: TextFile, header: _Header) -> list[int]:
+    """Rows that hold data: below the header, no comments, no sums."""
+    first = -1 if header.line is None else header.line
+    rows = [
+        row for row in range(first + 1, len(file))
+        if not file.lines[row].startswith("#") and not OF_TOTALS.match(file.lines[row])
+    ]  # fmt: skip
+    # the user stated the columns of a list that has names of its own
+    has_names = header.line is None and rows and not any(map(_is_number, cells(file.lines[rows[0]], header.separator)))
+    return rows[1:] if has_names else rows
+
+
+def _is_number(word: str) -> bool:
+    return all_numbers([word.replace(",", ".", 1)])
+
+
+def _with_points(words: dict[int, list[str]]) -> dict[int, list[str]]:
+    """Numbers with a decimal comma as such with a point."""
+    comma = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
+    return {
+        row: [word.replace(",", ".") if comma.fullmatch(word) else word for word in line] for row, line in words.items()
+    }
+
+
+def _system(
+    file: TextFile, header: _Header, columns: dict[str, list[str]]
+) -> tuple[StatedSystem, tuple[str, ...]]:  # fmt: skip
+    """The coordinate system that a comment or a column names, and what to say of it."""
+    name = file.path.name
+    comments = [(row, found[1]) for row, line in enumerate(file.lines) if (found := OF_SYSTEM.match(line))]
+    comments += [(row, line.lstrip("# ")) for row, line in enumerate(file.lines[:40]) if re.match(r"#\s*EPSG:", line)]
+    of_column = sorted(set(columns.get("crs", ())) - {""})
+    if len(of_column) > 1:
+        shown = f"'{of_column[0][:40]}' and '{of_column[1][:40]}'"
+        raise InputError(f"names several coordinate systems: {shown}", "give one list for each", file.path)
+    stated = [*comments, *((header.line or 0, text) for text in of_column)]
+    if not stated:
+        geographic = not {"X", "Y"} & header.meanings and "lon" in header.meanings
+        return StatedSystem(GEOGRAPHIC if geographic else ""), _notes(header, name)
+    row, text = stated[0]
+    try:
+        system = stated_system(text)
+    except InputError as error:
+        raise file.error(row, error.message, error.remedy) from error
+    if system is None:
+        raise file.error(row, f"the coordinate system '{text[:80]}' is not known", REMEDY)
+    return system, ((f"{name}: {system.note}",) if system.note else ()) + _notes(header, name)
+
+
+def _notes(header: _Header, name: str) -> tuple[str, ...]:
+    said = []
+    for column in header.columns:
+        if column.unit and np.isnan(column.factor):
+            said.append(f"{name}: what stands in brackets in '{column.name}' is not used")
+        elif column.unit and column.factor != 1.0:
+            said.append(f"{name}: column '{column.name}' was brought to {_metric(column)}")
+    return tuple(said)
+
+
+def _metric(column: ListColumn) -> str:
+    return "degrees" if column.meaning in ("lon", "lat", "omega", "phi", "kappa", "yaw", "pitch", "roll") else "metres"
 
 
 def _names(found: _List, what: str) -> np.ndarray:
     names = found.columns["name"]
     if not names:
-        raise found.file.error(0, f"holds no {what}s", "give a row for each")
+        raise found.file.error(len(found.file), f"holds no {what}s", "give a row for each")
     found.file.check_names(names, found.rows, what)
     found.file.refuse_repeated(names, found.rows, what)
     return texts(names)
 
 
 def _coordinates(found: _List) -> tuple[np.ndarray, str]:
-    """(n, 3), and the CRS where the names of the columns tell it."""
-    by_name = found.columns
-    if "X" in by_name or "Y" in by_name or "lon" not in by_name:
-        return found.numbers("X", "Y", "Z"), ""
-    return found.numbers("lon", "lat", "Z"), GEOGRAPHIC
+    """(n, 3), and the CRS where a comment or the names of the columns tell it."""
+    given, crs = found.columns, found.system.crs
+    plane = "X" in given or "Y" in given or "lon" not in given
+    # a longitude called X is one where the system counts in degrees
+    height = "h_ell" if "h_ell" in given and ("Z" not in given or not plane) else "Z"
+    if plane:
+        return found.numbers("X", "Y", height), crs
+    if crs and not _is_geographic(crs):
+        crs = GEOGRAPHIC
+    return found.numbers("lon", "lat", height), crs
 
 
-def _sigma(found: _List, may_be_zero: bool = False) -> np.ndarray:
+def _is_geographic(crs: str) -> bool:
+    from aerotri.coordinates.georeference import is_projected
+
+    return not is_projected(plan_of(crs))
+
+
+def _sigma(found: _List, may_be_zero: bool = False) -> tuple[np.ndarray, tuple[str, ...]]:
     """(n, 3) m; the more particular column counts. 0, where it may be, stands for a coordinate without error."""
-    sigma = found.numbers("sX", "sY", "sZ")
-    for fallback in (found.numbers("s_plan", "s_plan", "s_height"), found.numbers("s_all", "s_all", "s_all")):
-        sigma = np.where(np.isnan(sigma), fallback, sigma)
+    said: tuple[str, ...] = ()
+    given = [name for name in SIGMAS if name in found.columns]
+    if given == ["sX"]:
+        # Metashape names the one accuracy after the first axis
+        found = replace(found, columns={**found.columns, "s_all": found.columns["sX"]})
+        said = (f"{found.file.path.name}: the accuracy of X is the only one, and counts for Y and Z too",)
+        sigma = np.repeat(found.numbers("sX"), 3, axis=1)
+    else:
+        sigma = found.numbers("sX", "sY", "sZ")
+        for fallback in (found.numbers("s_plan", "s_plan", "s_height"), found.numbers("s_all", "s_all", "s_all")):
+            sigma = np.where(np.isnan(sigma), fallback, sigma)
     bad = np.flatnonzero(((sigma < SMALLEST_POSITIVE) & ~((sigma == 0.0) & may_be_zero)).any(axis=1))
     if len(bad):
         size = "negative" if may_be_zero else "not greater than 0"
-        raise found.file.error(int(bad[0]) + 1, f"a standard deviation is {size}", "give a small one, in m")
-    return sigma
+        raise found.file.error(found.rows[bad[0]], f"a standard deviation is {size}", "give a small one, in m")
+    return sigma, said
 
 
 def _messages(found: _List, *used: str) -> tuple[str, ...]:
-    used_now = ("name", "X", "Y", "Z", "lon", "lat", "sX", "sY", "sZ", "s_plan", "s_height", "s_all", *used)
-    left = (*found.unknown, *(meaning for meaning in found.columns if meaning not in used_now))
-    if "X" in found.columns:
-        left += tuple(name for name in ("lon", "lat") if name in found.columns)
-    return (f"{found.file.path.name}: columns not carried over: {', '.join(left)}"[:400],) if left else ()
+    """What was read in another way than it stands there, and the columns that were not."""
+    plane = "X" in found.columns
+    used_now = {"name", "X", "Y", "crs", *SIGMAS, *used} | (set() if plane else {"lon", "lat"})
+    used_now.add("h_ell" if "h_ell" in found.columns and ("Z" not in found.columns or not plane) else "Z")
+    left = [column.name for column in found.header if column.name and column.meaning not in used_now]
+    said = f"{found.file.path.name}: columns not carried over: {', '.join(left)}"[:400]
+    return (*found.notes, *((said,) if left else ()))
 
 
-def read_positions(path: FilePath) -> PositionList:
+def read_positions(path: FilePath, columns: str = "") -> PositionList:
     """Observed positions of photographs.
+
+    Parameters
+    ----------
+    columns : see `stated_columns`; '' where the list names them.
 
     Raises
     ------
     InputError
         With the line: a coordinate that is missing or no number, a photograph there twice.
     """
-    found = _read(Path(path))
+    found = _read(Path(path), columns)
     names = _names(found, "photograph")
     xyz, crs = _coordinates(found)
     partial = np.flatnonzero(np.isnan(xyz).any(axis=1))
     if len(partial):
         remedy = "positions need X, Y and Z, or longitude, latitude and height"
-        raise found.file.error(int(partial[0]) + 1, "a coordinate is missing", remedy)
+        raise found.file.error(found.rows[partial[0]], "a coordinate is missing", remedy)
     angles = np.radians(found.numbers("yaw", "pitch", "roll"))
     angles[np.isnan(angles).any(axis=1)] = np.nan
-    return PositionList(
-        found.file.path, names, xyz, _sigma(found), angles, crs, _messages(found, "yaw", "pitch", "roll")
-    )
+    sigma, said = _sigma(found)
+    messages = (*_messages(found, "yaw", "pitch", "roll"), *said)
+    return PositionList(found.file.path, names, xyz, sigma, angles, crs, messages)
 
 
-def read_control_list(path: FilePath) -> PointList:
+def read_control_list(path: FilePath, columns: str = "") -> PointList:
     """Control and check points; an empty coordinate is unknown.
+
+    Parameters
+    ----------
+    columns : see `stated_columns`; '' where the list names them.
 
     Raises
     ------
     InputError
         With the line: no coordinate at all, no number, a role that is none, a point there twice.
     """
-    found = _read(Path(path))
+    found = _read(Path(path), columns)
     names = _names(found, "point")
     xyz, crs = _coordinates(found)
     nothing = np.flatnonzero(np.isnan(xyz).all(axis=1))
     if len(nothing):
         remedy = "name the columns X, Y, Z, or Easting, Northing, Height, and fill one of them"
-        raise found.file.error(int(nothing[0]) + 1, "the point has no coordinates", remedy)
+        raise found.file.error(found.rows[nothing[0]], "the point has no coordinates", remedy)
     roles = np.array(found.columns.get("role", ["control"] * len(names)))
     odd = np.flatnonzero((roles != "control") & (roles != "check"))
     if len(odd):
         raise found.file.error(
-            int(odd[0]) + 1, f"role = '{roles[odd[0]][:60]}' is not possible", "a role is control or check"
+            found.rows[odd[0]], f"role = '{roles[odd[0]][:60]}' is not possible", "a role is control or check"
         )
+    sigma, said = _sigma(found, may_be_zero=True)
     return PointList(
-        found.file.path, names, xyz, _sigma(found, may_be_zero=True), roles == "check", crs,
-        heights="ellipsoidal" if found.ellipsoidal else "", messages=_messages(found, "role"),
+        found.file.path, names, xyz, sigma, roles == "check", crs,
+        heights="ellipsoidal" if "h_ell" in found.columns and "Z" not in found.columns else "",
+        messages=(*_messages(found, "role"), *said),
     )  # fmt: skip
 
 
@@ -237,7 +396,7 @@ def read_named_orientations(path: FilePath) -> OrientationList:
     values = found.numbers("X", "Y", "Z", "omega", "phi", "kappa")
     partial = np.flatnonzero(np.isnan(values).any(axis=1))
     if len(partial):
-        raise found.file.error(int(partial[0]) + 1, "a value is missing", "give X, Y, Z, omega, phi, kappa")
+        raise found.file.error(found.rows[partial[0]], "a value is missing", "give X, Y, Z, omega, phi, kappa")
     rotation = rotation_from_angles(np.radians(values[:, 3:]))
     messages = _messages(found, "omega", "phi", "kappa")
     return OrientationList(found.file.path, names, np.full(len(names), ""), values[:, :3], rotation, messages=messages)

@@ -1,6 +1,6 @@
 """OpenDroneMap's gcp_list.txt and geo.txt.
 
-Both begin with the coordinate system: ``EPSG:n``, a PROJ string, or ``WGS84 UTM 16N``. gcp_list.txt then has
+Both begin with the coordinate system: ``EPSG:n``, a PROJ string, WKT, or ``WGS84 UTM 16N``. gcp_list.txt then has
 ``geo_x geo_y geo_z im_x im_y image [point] [extras]``, a row an image point; pixels count from 0 at the CENTRE of the
 upper left one, as OpenSfM takes them, so half a pixel is added. geo.txt has ``image geo_x geo_y [geo_z] [yaw] [pitch]
 [roll] [h_acc v_acc]``, angles in degrees, pitch 0 straight down [C]. Names with blanks stand in quotes, or tabs
@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted, px_from_mm
+from aerotri.coordinates.stated_systems import StatedSystem, stated_system
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.parts import PointList, PositionList, RayList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
@@ -26,33 +27,15 @@ from aerotri.observations.names import ENDING
 FIRST_PIXEL = 0.5
 """Position of the centre of the first pixel, which OpenSfM calls 0."""
 UNKNOWN = ("nan", "-nan")
+HEADER = re.compile(r"EPSG:|\+proj=|\+init=|WGS\s?84|ETRS\s?89|UTM|[A-Z_]+\[", re.IGNORECASE)
+FIRST_LINE = "write EPSG:n, or EPSG:n+m with m the system of the heights, as the first line"
 WIDTHS = (3, 4, 7, 9)
 """Words of a row of geo.txt; what follows is the user's own."""
 
 
-def crs_of_header(text: str) -> str | None:
-    """'EPSG:n' of the first line of such a file, '' where it is a system that has no such name here, None for no CRS.
-
-    UTM and longitude/latitude are recognised in PROJ strings on WGS 84.
-    """
-    plain = text.strip()
-    if found := re.fullmatch(r"EPSG:(\d{1,6})", plain, re.IGNORECASE):
-        return f"EPSG:{found[1]}"
-    if found := re.fullmatch(r"WGS84\s+UTM\s+(\d{1,2})\s*([NS])", plain, re.IGNORECASE):
-        return _utm(int(found[1]), found[2].upper() == "S")
-    if not plain.startswith("+proj="):
-        return None
-    parts = [word.lstrip("+").partition("=") for word in plain.split()]
-    words = {key: value for key, _, value in parts}
-    if "WGS84" not in (words.get("datum"), words.get("ellps")) or words.get("units", "m") != "m":
-        return ""
-    if words["proj"] == "utm" and words.get("zone", "").isdigit():
-        return _utm(int(words["zone"]), "south" in words)
-    return "EPSG:4326" if words["proj"] in ("longlat", "latlong") else ""
-
-
-def _utm(zone: int, south: bool) -> str:
-    return f"EPSG:{(32700 if south else 32600) + zone}" if 1 <= zone <= 60 else ""
+def is_header(text: str) -> bool:
+    """Whether the first line of a file names a coordinate system, a known one or not."""
+    return bool(HEADER.match(text.strip())) or (" / " in text and stated_system(text) is not None)
 
 
 def is_odm_gcp(path: Path) -> bool:
@@ -60,7 +43,7 @@ def is_odm_gcp(path: Path) -> bool:
     lines = first_lines(path, 2)
     words = _cells(lines[1], 5) if len(lines) > 1 else []
     known = [is_number(word) or word.lower() in UNKNOWN for word in words[:5]]
-    return len(words) > 5 and crs_of_header(lines[0]) is not None and all(known)
+    return len(words) > 5 and is_header(lines[0]) and all(known)
 
 
 def is_odm_geo(path: Path) -> bool:
@@ -69,7 +52,7 @@ def is_odm_geo(path: Path) -> bool:
     words = _cells(lines[1], 0) if len(lines) > 1 else []
     return (
         len(words) > 2
-        and crs_of_header(lines[0]) is not None
+        and is_header(lines[0])
         and not is_number(words[0])
         and all(is_number(word) or word.lower() in UNKNOWN for word in words[1:4])
     )
@@ -90,21 +73,30 @@ def _cells(line: str, before: int) -> list[str]:
     return [*words[:before], " ".join(words[before : end + 1]), *words[end + 1 :]]
 
 
-def _begin(path: Path, form: str) -> tuple[TextFile, str, tuple[str, ...]]:
-    """The file, its CRS, and a message where that has no name here."""
-    file = TextFile(path)
-    crs = crs_of_header(file.lines[0]) if len(file) else None
-    if crs is None:
+def _begin(path: Path, form: str) -> tuple[TextFile, StatedSystem, tuple[str, ...]]:
+    """The file, its coordinate system, and what to say of that."""
+    file = TextFile(path, any_letters=True)
+    if not len(file) or not is_header(file.lines[0]):
         raise file.error(0, "does not begin with a coordinate system", "the first line is EPSG:n, or WGS84 UTM 47N")
     if len(file) < 2:
         raise file.error(len(file), "has no rows", f"rows are: {form}")
-    return file, crs, () if crs else (f"{path.name}: '{file.lines[0][:80]}' is taken as it is: name it with --crs",)
+    try:
+        system = stated_system(file.lines[0])
+    except InputError as error:
+        raise file.error(0, error.message, FIRST_LINE) from error
+    if system is None:
+        raise file.error(0, f"the coordinate system '{file.lines[0][:80]}' is not known", FIRST_LINE)
+    return file, system, (*file.notes, *((f"{path.name}: {system.note}",) if system.note else ()))
 
 
-def read_odm_gcp(path: FilePath) -> PointList:
+def read_odm_gcp(path: FilePath, exchanged: bool = False) -> PointList:
     """Control points with their image points; a height of NaN is unknown.
 
     Points without a name are told apart by their coordinates and called gcp1, gcp2 …
+
+    Parameters
+    ----------
+    exchanged : whether Y, or the latitude, stands first.
 
     Raises
     ------
@@ -113,7 +105,7 @@ def read_odm_gcp(path: FilePath) -> PointList:
         photograph.
     """
     form = "geo_x geo_y geo_z im_x im_y image [point]"
-    file, crs, messages = _begin(Path(path), form)
+    file, system, messages = _begin(Path(path), form)
     words, rows = [_cells(line, 5) for line in file.lines], list(range(1, len(file)))
     for row in rows:
         if len(words[row]) < 6:
@@ -131,7 +123,7 @@ def read_odm_gcp(path: FilePath) -> PointList:
     place: dict[str, int] = {}
     image = np.array([image_place.setdefault(name, len(image_place)) for name in images], dtype=np.int64)
     point = np.array([place.setdefault(name, len(place)) for name in names], dtype=np.int64)
-    xyz = _places(file, rows, names, point, values[:, :3])
+    xyz = _places(file, rows, names, point, values[:, :3])[:, _order(exchanged)] * _factors(system)
     file.refuse_repeated([f"{p}' in photograph '{i}" for p, i in zip(names, images, strict=True)], rows, "point")
     return PointList(
         path=file.path,
@@ -139,7 +131,7 @@ def read_odm_gcp(path: FilePath) -> PointList:
         xyz=xyz,
         sigma=no_sigma(len(xyz)),
         is_check=np.zeros(len(xyz), bool),
-        crs=crs,
+        crs=system.crs,
         rays=RayList(
             path=file.path,
             images=texts(list(image_place)),
@@ -153,6 +145,15 @@ def read_odm_gcp(path: FilePath) -> PointList:
         ),
         messages=(*messages, *_about_heights(file.path, xyz[:, 2], "point")),
     )
+
+
+def _order(exchanged: bool) -> list[int]:
+    return [1, 0, 2] if exchanged else [0, 1, 2]
+
+
+def _factors(system: StatedSystem) -> np.ndarray:
+    """(3,) what X, Y, Z are multiplied with."""
+    return np.array([system.plan_to_metre, system.plan_to_metre, system.height_to_metre])
 
 
 def _point_names(words: list[list[str]], rows: list[int], values: np.ndarray) -> list[str]:
@@ -191,8 +192,12 @@ def _about_heights(path: Path, heights: np.ndarray, what: str) -> tuple[str, ...
     return tuple(said)
 
 
-def read_odm_geo(path: FilePath) -> PositionList:
+def read_odm_geo(path: FilePath, exchanged: bool = False) -> PositionList:
     """Positions of photographs; photographs without a height are left out, since a position needs it.
+
+    Parameters
+    ----------
+    exchanged : whether Y, or the latitude, stands first.
 
     Raises
     ------
@@ -200,7 +205,7 @@ def read_odm_geo(path: FilePath) -> PositionList:
         With the line: no coordinate system, a row that is not of the form, a photograph there twice.
     """
     form = "image geo_x geo_y [geo_z] [yaw pitch roll] [h_acc v_acc]"
-    file, crs, messages = _begin(Path(path), form)
+    file, system, messages = _begin(Path(path), form)
     words, rows = [_cells(line, 0) for line in file.lines], list(range(1, len(file)))
     for row in rows:
         if len(words[row]) < min(WIDTHS):
@@ -233,10 +238,10 @@ def read_odm_geo(path: FilePath) -> PositionList:
     return PositionList(
         file.path,
         texts(names)[there],
-        values[there, :3],
+        values[there][:, _order(exchanged)] * _factors(system),
         accuracy[there][:, [0, 0, 1]],
         angles[there],
-        crs,
+        system.crs,
         tuple(said),
     )
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import InputError, counted
-from aerotri.formats.text.csv_text import UTF8_REMEDY, read_bytes
+from aerotri.formats.text.csv_text import read_bytes
+from aerotri.formats.text.encodings import UTF8_REMEDY
 
 LARGEST = 1e9
 """Largest number of a reconstruction; chosen [C]: beyond every coordinate in metres and every pixel; squares of it keep

@@ -13,6 +13,7 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.parts import OrientationList, texts
+from aerotri.formats.foreign.named_lists import is_named
 from aerotri.formats.text.tables import LARGEST_FORMAT_PX, SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, first_lines
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -25,7 +26,7 @@ SQUARE = 1e-3
 def is_orientation_list(path: Path) -> bool:
     """Whether rows are a name and six numbers."""
     lines = [line.split() for line in first_lines(path, 3)]
-    return bool(lines) and all(len(line) == 7 and all_numbers(line[1:]) for line in lines)
+    return bool(lines) and all(len(line) == 7 and all_numbers(line[1:]) for line in lines) and not is_named(path)
 
 
 def read_orientation_list(path: FilePath) -> OrientationList:

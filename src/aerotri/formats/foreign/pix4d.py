@@ -18,6 +18,7 @@ from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
+from aerotri.formats.foreign.named_lists import is_named
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, check_words, first_lines
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
@@ -48,9 +49,8 @@ def is_pix4d_geo(path: Path) -> bool:
 
 def _is_list(path: Path, widths: tuple[int, ...]) -> bool:
     lines = [line.split(",") for line in first_lines(path, 3)]
-    return bool(lines) and all(
-        len(line) in widths and all_numbers([word.strip() for word in line[1:]]) for line in lines
-    )
+    rows = [len(line) in widths and all_numbers([word.strip() for word in line[1:]]) for line in lines]
+    return bool(lines) and all(rows) and not is_named(path)
 
 
 def read_pix4d_eo(path: FilePath, offset: np.ndarray | None = None) -> OrientationList:
@@ -110,7 +110,9 @@ def read_pix4d_gcp(path: FilePath, axes: str = "xy") -> PointList:
     """
     file, names, values = _rows(Path(path), GCP_WIDTHS, "label,c1,c2,z, then acc_h,acc_v or not", "point")
     xyz, sigma = _ordered(values[:, :3], axes), _spread(file, values[:, 3:], may_be_zero=True)
-    return PointList(file.path, texts(names), xyz, sigma, np.zeros(len(names), bool))
+    return PointList(
+        file.path, texts(names), xyz, sigma, np.zeros(len(names), bool), messages=_guessed(file, values, axes)
+    )
 
 
 def read_pix4d_geo(path: FilePath, axes: str = "xy") -> PositionList:
@@ -130,12 +132,26 @@ def read_pix4d_geo(path: FilePath, axes: str = "xy") -> PositionList:
     has_angles = values.shape[1] > 5
     angles = np.radians(values[:, 3:6]) if has_angles else no_sigma(len(names))
     sigma = _spread(file, values[:, 6 if has_angles else 3 :])
-    return PositionList(file.path, texts(names), _ordered(values[:, :3], axes), sigma, angles)
+    said = _guessed(file, values, axes, has_angles)
+    return PositionList(file.path, texts(names), _ordered(values[:, :3], axes), sigma, angles, messages=said)
+
+
+def _guessed(file: TextFile, values: np.ndarray, axes: str, has_angles: bool = False) -> tuple[str, ...]:
+    """How the columns were taken, which no line of the file names."""
+    accuracies = {1: ("accuracy",), 2: ("accuracy in plan", "accuracy of the height")}
+    left = values.shape[1] - (6 if has_angles else 3)
+    columns = (
+        *("name", *axes.upper(), "Z"),
+        *(("yaw", "pitch", "roll") if has_angles else ()),
+        *accuracies.get(left, ()),
+    )
+    said = f"{file.path.name}: no line names the columns; taken as {', '.join(columns)}"
+    return (*file.notes, f"{said}: state others with --columns")
 
 
 def _rows(path: Path, widths: tuple[int, ...], form: str, what: str) -> tuple[TextFile, list[str], np.ndarray]:
     """Names and numbers of a comma separated list of constant width."""
-    file = TextFile(path)
+    file = TextFile(path, any_letters=True)
     words = file.words(",")
     if not words:
         raise file.error(0, f"holds no {what}s", f"rows are: {form}")

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError, regular_file
+from aerotri.formats.text.encodings import UTF8_REMEDY
 from aerotri.spreadsheet import with_formula
 
-UTF8_REMEDY = "save the table as UTF-8"
 QUOTE = b'"'
 BLANKS = " \t\n\r\v\f"
 """What is taken off both ends of a name."""

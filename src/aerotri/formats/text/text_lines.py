@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.formats.text.csv_text import UTF8_REMEDY, read_bytes
+from aerotri.formats.text.csv_text import read_bytes
+from aerotri.formats.text.encodings import decoded, head_decoded
 from aerotri.formats.text.tables import CONTROL_CHARACTERS, LARGEST_NUMBER, LONGEST_NAME, NUMBER
 
 HEAD = 4096
@@ -23,7 +24,7 @@ class TextFile:
     Parameters
     ----------
     path : the file.
-    comments : whether lines that begin with # are left out.
+    comments : whether lines that begin with # are left out. any_letters : whether UTF-16 and Windows-1252 are read too.
     part : bytes of some lines of the file, where not all are meant. first_line : number of the first of them.
 
     Raises
@@ -32,10 +33,18 @@ class TextFile:
         When it cannot be read, or is not UTF-8.
     """
 
-    def __init__(self, path: Path, comments: bool = True, part: bytes | None = None, first_line: int = 1):
+    def __init__(
+        self,
+        path: Path,
+        comments: bool = True,
+        part: bytes | None = None,
+        first_line: int = 1,
+        any_letters: bool = False,
+    ):
         self.path = path
-        text = _decoded(read_bytes(path) if part is None else part, path, first_line)
-        raw = text.split("\n")
+        found = decoded(read_bytes(path) if part is None else part, path, first_line, any_letters)
+        self.notes = (found.note,) if found.note else ()
+        raw = found.text.split("\n")
         lines = [line.strip() for line in raw]
         kept = [(i, line) for i, line in enumerate(lines) if line and not (comments and line[0] == "#")]
         self.numbers = [i + first_line for i, _ in kept]
@@ -132,14 +141,6 @@ def is_number(word: str) -> bool:
     return word.isascii() and re.match(NUMBER, word) is not None and math.isfinite(float(word))
 
 
-def _decoded(raw: bytes, path: Path, first_line: int) -> str:
-    try:
-        return raw.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + first_line
-        raise InputError("is not UTF-8", UTF8_REMEDY, path, line) from error
-
-
 def first_lines(path: Path, count: int = 8, comments: bool = True) -> list[str]:
     """Up to `count` lines at the beginning of a file that hold something; [] for what is no text file."""
     try:
@@ -147,9 +148,9 @@ def first_lines(path: Path, count: int = 8, comments: bool = True) -> list[str]:
             return []
         with path.open("rb") as file:
             raw = file.read(HEAD)
-        text = raw.decode("utf-8", "strict" if len(raw) < HEAD else "ignore").removeprefix("\ufeff")
-    except (OSError, UnicodeDecodeError):
+    except OSError:
         return []
+    text = head_decoded(raw)
     lines = text.replace("\r", "\n").split("\n")
     if len(raw) == HEAD:
         # the last one may be cut off
