@@ -33,6 +33,8 @@ MB."""
 TILE = 512
 """Side of the tiles of files written, pixels; a multiple of 16 as TIFF asks for, and the size usual for cloud-optimised
 files."""
+SAMPLED_CELLS, FEWEST_ROWS = 64e6, 16
+"""Cells that are read for a sample at most, but for so many rows [C]: a second or two of a packed file."""
 SIGMA = "σ"
 """The description of a band of σ begins with it."""
 BANDS_REMEDY = "give heights in one band, and their σ in a second one whose description begins with 'σ', if it has one"
@@ -247,6 +249,27 @@ class RasterReader:
         # a division by zero in another program is no height either
         values[np.isinf(values)] = np.nan
         return values
+
+    @property
+    def is_masked(self) -> bool:
+        """Whether the file has a mask of the cells that are known."""
+        return self._masked
+
+    def sampled(self, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Every so manyth cell, `most` rows and columns at most; and the rows and columns that they are in.
+
+        Fewer rows where each costs the reading of large tiles.
+        """
+        cost = self._file.block_shapes[0][0] * self.grid.columns
+        most_rows = int(np.clip(SAMPLED_CELLS / cost, FEWEST_ROWS, most))
+        rows, columns = (
+            np.unique(np.linspace(0, count - 1, min(count, limit)).astype(np.int64))
+            for count, limit in ((self.grid.rows, most_rows), (self.grid.columns, most))
+        )
+        found = np.empty((len(rows), len(columns)), self.dtype)
+        for k, row in enumerate(rows.tolist()):
+            found[k] = self.read(row, 0, 1, self.grid.columns)[0, columns]
+        return found, rows, columns
 
     def sample(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """(n,) bilinear values at places (n,); NaN where one of the four cells is not known.

@@ -19,6 +19,7 @@ from aerotri.conventions import FilePath, InputError
 from aerotri.crs_text import heights_of, plan_of, with_heights
 from aerotri.rasters.grids import NO_DATA, Grid, RasterReader
 from aerotri.rasters.height_systems import metric_height_system
+from aerotri.rasters.undeclared import refuse_undeclared_no_data
 
 if TYPE_CHECKING:
     from pyproj import CRS
@@ -94,6 +95,8 @@ class MetricReader(RasterReader):
         self._source: Any = None
         self._factor, self._heights = METRE, ""
         try:
+            if band == 1:
+                refuse_undeclared_no_data(self)
             self._bring_to_metres(target)
         except InputError:
             self._file.close()

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from aerotri.conventions import InputError, regular_file
+from aerotri.conventions import InputError
+from aerotri.foreign_json import read_foreign_json
 
 LARGEST_M = 1e12
 """No coordinate lies farther out; numbers beyond lose their decimals, and squares of them overflow."""
@@ -35,7 +35,7 @@ def read_geojson(path: Path) -> tuple[str, list[GeoJsonFeature]]:
     InputError
         When the file cannot be read, is no JSON or no GeoJSON, naming the feature that is wrong.
     """
-    content = _content(path)
+    content = read_foreign_json(path, REMEDY)
     if not isinstance(content, dict):
         raise InputError("is no GeoJSON", REMEDY, path)
     features = [_feature(entry, number, path) for number, entry in enumerate(_entries(content, path), start=1)]
@@ -45,24 +45,6 @@ def read_geojson(path: Path) -> tuple[str, list[GeoJsonFeature]]:
 def crs_of_name(name: str) -> dict[str, Any]:
     """A FeatureCollection that says its CRS and nothing else."""
     return {"crs": {"type": "name", "properties": {"name": name}}} if name else {}
-
-
-def _content(path: Path) -> Any:
-    regular_file(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError("is not UTF-8", "save it as UTF-8", path) from error
-    except OSError as error:
-        reason = f"cannot be read: {error.strerror or error}"
-        raise InputError(reason, "check the file and its permissions", path) from error
-    try:
-        # a whole number of 5000 digits is a float without end here, and refused as a coordinate
-        return json.loads(text, parse_int=lambda digits: int(digits) if len(digits) < 17 else float(digits))
-    except json.JSONDecodeError as error:
-        raise InputError(f"is not JSON: {error.msg}", "is it cut off?", path, error.lineno) from error
-    except (RecursionError, ValueError) as error:
-        raise InputError("is not JSON that can be read: it is nested too deeply", REMEDY, path) from error
 
 
 def _entries(content: dict[str, Any], path: Path) -> list[Any]:

@@ -110,7 +110,7 @@ WRONG = {
     "forward": ({"script.xml": SCRIPT.replace("<model>3", "<model>-3")}, "forward lens"),
     "unit": ({"script.xml": SCRIPT.replace("<unit>mm", "<unit>inch")}, "measured in 'inch'"),
     "focal": ({"script.xml": SCRIPT.replace("<cc>51", "<cc>-51")}, "no principal distance"),
-    "estimate": ({"script.xml": SCRIPT.replace("<aspect>false", "<aspect>true")}, "estimates aspect"),
+    "estimate": ({"script.xml": SCRIPT.replace("<skew>false", "<skew>true")}, "estimates skew"),
     "element": ({"script.xml": SCRIPT.replace("<px>false</px>", "<pz>false</pz>")}, "unknown element <pz>"),
     "datum": ({"script.xml": SCRIPT.replace("depend", "free")}, "datum 'free'"),
     "units": ({"script.xml": SCRIPT.replace('units="gon"', "")}, "without their unit"),

@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from aerotri.conventions import RADIANS_PER, FilePath, InputError, mm_from_px
-from aerotri.formats.foreign.dbat_camera import DbatCamera, estimated_elements, read_camera
+from aerotri.formats.foreign.dbat_camera import ASPECT, DbatCamera, estimated_elements, read_camera
 from aerotri.formats.foreign.dbat_script import Script, one, read_script
 from aerotri.formats.text.table_checks import refuse_duplicates, sigma_columns
 from aerotri.formats.text.tables import LARGEST_NUMBER, SMALLEST_POSITIVE, Columns, Table, read_table
@@ -78,9 +78,14 @@ def _cameras(script: Script) -> tuple[tuple[Camera, ...], list[str]]:
         raise InputError("there is no <camera>", "describe the camera", path)
     default = any(_starts_from_defaults(element, script) for element in script.operations("set_initial_values/io"))
     found = [read_camera(element, default, path) for element in elements]
-    chosen = script.operations("set_bundle_estimate_params/io")
-    estimated = estimated_elements(chosen[-1] if chosen else None, script.path)
+    estimated = _estimated(script)
     return tuple(camera.camera(estimated) for camera in _named_apart(found)), [camera.number for camera in found]
+
+
+def _estimated(script: Script) -> frozenset[str]:
+    """Elements of the cameras that the bundle estimates."""
+    chosen = script.operations("set_bundle_estimate_params/io")
+    return estimated_elements(chosen[-1] if chosen else None, script.path)
 
 
 def _starts_from_defaults(element: Element, script: Script) -> bool:
@@ -255,6 +260,8 @@ def _adjustment(
 ) -> AdjustmentSettings:
     _refuse_partial_estimation(script)
     free = [name for name, prior in _brown_of_all(cameras).items() if not prior.fixed]
+    # DBAT stretches x before the lens, b1 after it: the same but for the product of both
+    free += ["b1"] if ASPECT in _estimated(script) else []
     parameters = (("brown", tuple(free)),) if free else ()
     datum = script.operations("set_datum")
     if datum:

@@ -21,9 +21,11 @@ SAME_PIXEL = 1e-6
 LENS = ("K1", "K2", "K3", "P1", "P2")
 UNIT_MM = {"mm": 1.0}
 """Millimetres of the units a DBAT script may name: all its cameras are in mm."""
-GROUPS = {"all": ("cc", "px", "py", *LENS), "cc": ("cc",), "pp": ("px", "py"), "K": LENS[:3], "P": LENS[3:]}
+GROUPS = {
+    "all": ("cc", "px", "py", *LENS, "aspect", "skew"), "cc": ("cc",), "pp": ("px", "py"), "K": LENS[:3], "P": LENS[3:],
+}  # fmt: skip
 """Parameters that an element of a DBAT script stands for."""
-NOT_MODELLED = ("aspect", "skew")
+ASPECT, SKEW = "aspect", "skew"
 
 
 @dataclass(frozen=True)
@@ -131,12 +133,12 @@ def _values(
 
 
 def estimated_elements(element: Element | None, path: Path) -> frozenset[str]:
-    """Which of cc, px, py, K1 … P2 an ``<io>`` of set_bundle_estimate_params lets the bundle estimate.
+    """Which of cc, px, py, K1 … P2, aspect an ``<io>`` of set_bundle_estimate_params lets the bundle estimate.
 
     Raises
     ------
     InputError
-        For an unknown element, and for aspect or skew, which have no counterpart here.
+        For an unknown element, and for skew, which has no counterpart here.
     """
     if element is None:
         return frozenset()
@@ -145,12 +147,10 @@ def estimated_elements(element: Element | None, path: Path) -> frozenset[str]:
     for tag, text in entries or [("all", text_of(element))]:
         if text not in ("true", "false"):
             raise InputError(f"<io><{tag}> is '{text}'", "it is true or false", path)
-        if tag in NOT_MODELLED:
-            if text == "true":
-                raise InputError(f"the script estimates {tag}", "set it to false; see brown:b1+b2 for affinity", path)
-            continue
         names = GROUPS.get(tag, (tag,))
         if not set(names) <= set(GROUPS["all"]):
             raise InputError(f"<io> has an unknown element <{tag}>", f"known are {', '.join(GROUPS['all'])}", path)
         chosen = chosen | set(names) if text == "true" else chosen - set(names)
+    if SKEW in chosen:
+        raise InputError("the script estimates skew", "set it to false: <skew>false</skew>", path)
     return frozenset(chosen)

@@ -215,28 +215,61 @@ def rotation_of(values: np.ndarray, what: str, path: Path) -> np.ndarray:
     return rotation
 
 
-def transform_of(chunk: Element, path: Path) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """Rotation (3, 3), translation (3,) and scale of the chunk or its active component; None where there is none.
+Transform = tuple[np.ndarray, np.ndarray, float]
+"""Rotation (3, 3), translation (3,) and scale: X = t + s·R·x."""
+
+
+def transform_of(chunk: Element, path: Path) -> Transform | None:
+    """The transformation of the chunk or its active component; None where there is none.
 
     Raises
     ------
     InputError
     """
-    components = chunk.find("components")
-    active = None if components is None else components.get("active_id")
-    parts = [] if components is None else [part for part in components if part.get("id") == active] or list(components)
-    for owner in (*parts, chunk):
-        found = owner.find("transform")
-        if found is not None and found.find("rotation") is not None:
-            rotation = rotation_of(
-                numbers(found.find("rotation"), 9, "the chunk's rotation", path), "the chunk's", path
-            )
-            translation = numbers(found.find("translation"), 3, "the chunk's translation", path)
-            scale = numbers(found.find("scale"), 1, "the chunk's scale", path)[0]
-            if scale < SMALLEST_POSITIVE:
-                raise InputError("the chunk's scale is not greater than 0", REMEDY, path)
-            return rotation, translation, float(scale)
+    for owner in (*components_of(chunk)[:1], chunk):
+        found = _transform_in(owner, path)
+        if found is not None:
+            return found
     return None
+
+
+def components_of(chunk: Element) -> list[Element]:
+    """The components, the active one first."""
+    components = chunk.find("components")
+    if components is None:
+        return []
+    active = components.get("active_id")
+    return sorted(components, key=lambda part: part.get("id") != active)
+
+
+def other_components(chunk: Element, path: Path) -> dict[str, tuple[str, Transform | None]]:
+    """Label, and transformation into the axes of the active component, of the others by id; None where not known.
+
+    Raises
+    ------
+    InputError
+    """
+    active, found = transform_of(chunk, path), {}
+    for part in components_of(chunk)[1:]:
+        own = _transform_in(part, path)
+        between = None
+        if active is not None and own is not None:
+            (turn, move, scale), (r, t, s) = active, own
+            between = turn.T @ r, turn.T @ (t - move) / scale, s / scale
+        found[part.get("id", "")] = (part.get("label", ""), between)
+    return found
+
+
+def _transform_in(owner: Element, path: Path) -> Transform | None:
+    found = owner.find("transform")
+    if found is None or found.find("rotation") is None:
+        return None
+    rotation = rotation_of(numbers(found.find("rotation"), 9, "the chunk's rotation", path), "the chunk's", path)
+    translation = numbers(found.find("translation"), 3, "the chunk's translation", path)
+    scale = numbers(found.find("scale"), 1, "the chunk's scale", path)[0]
+    if scale < SMALLEST_POSITIVE:
+        raise InputError("the chunk's scale is not greater than 0", REMEDY, path)
+    return rotation, translation, float(scale)
 
 
 def crs_of(chunk: Element, path: Path) -> str:

@@ -7,6 +7,7 @@ confirmed (pinned). Markers whose reference is switched off are check points.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +31,7 @@ from aerotri.formats.foreign.metashape_chunk import (
     names_of,
     number,
     numbers,
+    other_components,
     place_of,
     rotation_of,
     sensors_of,
@@ -127,7 +129,12 @@ def read_metashape_project(path: FilePath, pixel_um: float | None = None) -> Rea
     )
     cameras = tuple(sensor.camera for sensor in photographs.sensors.values())
     rigs, station = _rigs(photographs)
-    centre, rotation = _poses(photographs, path)
+    centre, rotation, of_parts = _poses(photographs, chunk, path)
+    known = np.isfinite(centre).all(axis=1)
+    if of_parts:
+        # their tie points have places in axes that lead nowhere
+        meeting = np.bincount(ties.point[known[ties.image]] - len(labels), minlength=len(start)) > 0
+        start = np.where(meeting[:, None], start, np.nan)
     block = Block(
         name=path.stem,
         cameras=_complete(cameras),
@@ -152,7 +159,9 @@ def read_metashape_project(path: FilePath, pixel_um: float | None = None) -> Rea
     reading = _with_reference(moved, control, _positions(photographs, accuracy["cameras"], path), crs)
     rolling = any(node.find("rolling_shutter") is not None for node in photographs.elements)
     said = ("rolling shutter corrections are not carried over: state [camera.NAME.rolling_shutter]",) * rolling
-    return replace(reading, messages=(*project.messages, *reading.messages, *about_marks, *about_ties, *said))
+    return replace(
+        reading, messages=(*project.messages, *reading.messages, *of_parts, *about_marks, *about_ties, *said)
+    )
 
 
 def _photographs(chunk: Element, pixel_um: float | None, path: Path) -> _Photographs:
@@ -206,18 +215,31 @@ def _rigs(photographs: _Photographs) -> tuple[tuple[Rig, ...], np.ndarray]:
     return tuple(out), np.array(station, dtype=object)
 
 
-def _poses(photographs: _Photographs, path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) projection centres and (n, 3, 3) rotations camera → chunk, NaN where there are none."""
+def _poses(photographs: _Photographs, chunk: Element, path: Path) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """(n, 3) projection centres and (n, 3, 3) rotations camera → chunk, NaN where there are none; what to say.
+
+    Those of components with a transformation of their own are brought into the axes of the active one.
+    """
     count = len(photographs.elements)
     centre, rotation = no_sigma(count), np.full((count, 3, 3), np.nan)
+    others, left = other_components(chunk, path), Counter[str]()
     for row, node in enumerate(photographs.elements):
         found = node.find("transform")
         if found is not None:
             label = node.get("label", "")
             matrix = numbers(found, 16, f"the transform of photograph '{label}'", path).reshape(4, 4)
             turn = rotation_of(matrix[:3, :3].ravel(), f"the transform of photograph '{label}'", path)
-            centre[row], rotation[row] = matrix[:3, 3], turn @ COLMAP_FROM_CAMERA
-    return centre, rotation
+            part, between = others.get(node.get("component_id", ""), ("", (np.eye(3), np.zeros(3), 1.0)))
+            if between is None:
+                left[part] += 1
+                continue
+            r, t, s = between
+            centre[row], rotation[row] = t + s * r @ matrix[:3, 3], r @ turn @ COLMAP_FROM_CAMERA
+    said = [
+        f"{counted(n, 'photograph')} of component '{part[:60]}' without orientation: its axes are tied to no others"
+        for part, n in left.items()
+    ]
+    return centre, rotation, said
 
 
 def _markers(

@@ -57,6 +57,10 @@ def is_opensfm(path: Path) -> bool:
     return file.suffix == ".json" and file.is_file()
 
 
+NO_POSITION = 999999.0
+"""gps_dop that OpenSfM writes for a photograph without a position, whose coordinates are 0 then [L: opensfm's exif]."""
+
+
 def file_of(path: Path) -> Path:
     """The file in local coordinates of a folder, or the file itself."""
     if not path.is_dir():
@@ -120,7 +124,7 @@ def read_opensfm(path: FilePath, pixel_um: float = 1.0) -> Reading:
         ),
         rigs=rigs,
     )
-    origin = _origin(chosen)
+    origin = _origin(chosen, observed is not None)
     if origin is not None:
         lon, lat, height = origin
         words = f"latitude {lat:.9g}, longitude {lon:.9g}, height {height:.6g} m"
@@ -138,15 +142,15 @@ def _is_frozen(config: Path) -> bool:
         return False
 
 
-def _origin(chosen: Node) -> tuple[float, float, float] | None:
-    """Longitude, latitude and height of the origin."""
+def _origin(chosen: Node, has_positions: bool) -> tuple[float, float, float] | None:
+    """Longitude, latitude and height of the origin; None where it is the one that OpenSfM writes for want of one."""
     if not chosen.has("reference_lla"):
         return None
     node = chosen.get("reference_lla")
     lon, lat, height = (node.get(key).number() for key in ("longitude", "latitude", "altitude"))
     if abs(lon) > 360.0 or abs(lat) > 90.0:
         raise node.error("is no place on the earth")
-    return lon, lat, height
+    return None if (lon, lat) == (0.0, 0.0) and not has_positions else (lon, lat, height)
 
 
 def _images(
@@ -202,20 +206,34 @@ def _image_points(tracks: Tracks, cameras: tuple[Camera, ...], camera_of_image: 
 
 def _observed(chosen: Node, shots: dict[str, Node]) -> tuple[GnssIns | None, list[str]]:
     """GNSS positions, and what to say of them."""
-    rows, xyz, sigma = [], [], []
+    rows, xyz, sigma, unknown_places = [], [], [], 0
     for row, node in enumerate(shots.values()):
         if node.has("gps_position") and node.has("gps_dop"):
             dop = node.get("gps_dop").number()
             if dop < SMALLEST_POSITIVE:
                 raise node.error("gps_dop is not greater than 0")
+            if dop >= NO_POSITION:
+                unknown_places += 1
+                continue
             rows.append(row)
             xyz.append(node.get("gps_position").numbers(3))
             sigma.append([dop] * 3)
+    said = []
+    if unknown_places:
+        said = [
+            f"{counted(unknown_places, 'photograph')} without GNSS position (gps_dop is OpenSfM's {NO_POSITION:.0f})"
+        ]
     if not rows:
-        return None, []
+        return None, [
+            *said,
+            "the block has no place and no scale: add control points, or positions with --positions",
+        ] if said else []
     unknown = no_sigma(len(rows))
     observed = GnssIns(np.array(rows, np.int64), np.array(xyz), np.array(sigma), unknown, unknown, unknown[:, 0])
-    return observed, [f"{counted(len(rows), 'GNSS position')} used as observations, with gps_dop as standard deviation"]
+    return observed, [
+        *said,
+        f"{counted(len(rows), 'GNSS position')} used as observations, with gps_dop as standard deviation",
+    ]
 
 
 def write_opensfm(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -10,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import InputError, counted
-from aerotri.formats.text.csv_text import read_bytes
-from aerotri.formats.text.encodings import UTF8_REMEDY
+from aerotri.foreign_json import read_foreign_json
 
 LARGEST = 1e9
 """Largest number of a reconstruction; chosen [C]: beyond every coordinate in metres and every pixel; squares of it keep
@@ -75,24 +73,6 @@ class Node:
         return self.value
 
 
-def read_json(path: Path, what: str = "export the reconstruction anew") -> Any:
-    """What a JSON file holds.
-
-    Raises
-    ------
-    InputError
-        When it is no JSON; `what` is the remedy.
-    """
-    try:
-        return json.loads(read_bytes(path).decode("utf-8"))
-    except UnicodeDecodeError as error:
-        raise InputError("is not UTF-8", UTF8_REMEDY, path) from error
-    except json.JSONDecodeError as error:
-        raise InputError(f"is not JSON: {error.msg}", "is it cut off?", path, error.lineno) from error
-    except (RecursionError, ValueError) as error:
-        raise InputError("is not JSON that can be read", what, path) from error
-
-
 def read_reconstructions(path: Path) -> list[Node]:
     """The reconstructions of a file, each with its shots.
 
@@ -100,7 +80,7 @@ def read_reconstructions(path: Path) -> list[Node]:
     ------
     InputError
     """
-    content = read_json(path)
+    content = read_foreign_json(path, "export the reconstruction anew")
     if not isinstance(content, list) or not content:
         raise InputError("holds no reconstruction", "it is a list of reconstructions", path)
     return [Node(value, f"reconstruction {i}", path) for i, value in enumerate(content)]
