@@ -9,8 +9,8 @@ from typing import Any
 
 from aerotri.conventions import InputError, regular_file
 
-ENDLESS = re.compile(r"[0-9]{4000}")
-"""Digits of a whole number that Python refuses to read: it becomes a float without end, which every reader refuses."""
+ENDLESS = re.compile(r"[0-9]{300}")
+"""Digits of a whole number that no float holds, or Python does not read: it becomes one without end, and is refused."""
 HIGH, LOW = r"\\u[dD][89abAB][0-9a-fA-F]{2}", r"\\u[dD][c-fC-F][0-9a-fA-F]{2}"
 HALF = re.compile(rf"(?<!\\)(?:\\\\)*(?:{HIGH}(?!{LOW})|(?<!\\u[dD][89abAB]..){LOW})")
 """Half of a pair of escapes that make one character together."""

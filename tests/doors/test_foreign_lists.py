@@ -37,7 +37,7 @@ def test_feet_in_brackets(door, run, name, columns):
 def test_local_feet_are_not_in_the_system_of_the_positions(door, run):
     door("csv_unit_in_brackets")
     words = "convert bingo.txt --out B --positions geo.txt --control gcp_local_ft.csv --control-sigma-m 0.01"
-    with pytest.raises(InputError, match=r"gcp_local_ft\.csv: lies 5.37e\+03 km from the photographs") as caught:
+    with pytest.raises(InputError, match=r"gcp_local_ft\.csv: lies 53\d\d km from the photographs") as caught:
         run(f"{words} {CAMERA}")
     assert "--crs" in caught.value.remedy
 

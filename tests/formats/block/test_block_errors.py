@@ -255,7 +255,7 @@ def test_a_table_is_no_block(small_block):
 def test_table_that_is_a_folder(small_block):
     folder = small_block({"images.csv": None})
     (folder / "images.csv").mkdir()
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="is a folder, not a file"):
         read_block(folder)
 
 

@@ -274,7 +274,7 @@ def refuse_far_off(points: np.ndarray, photographs: np.ndarray, file: os.PathLik
     size = max(float(np.ptp(xy, axis=0).max()) for xy in (one, other))
     if apart <= max(FAR_M, FAR_SIZES * size):
         return
-    message, remedy = f"lies {apart / 1e3:.3g} km from the photographs", OTHER_SYSTEM
+    message, remedy = f"lies {apart / 1e3:.0f} km from the photographs", OTHER_SYSTEM
     if exchanged < NEARER * apart:
         message, remedy = f"{message}, {exchanged / 1e3:.3g} km with X and Y exchanged", OTHER_AXES
     raise InputError(message, remedy, file)
