@@ -23,6 +23,7 @@ SHORTENED = 'PROJCS["WGS 84 / UTM zone 32N",GEOGCS["WGS 84"...]]'
         ("+proj=utm +zone=32 +ellps=GRS80 +towgs84=0,0,0", "EPSG:25832"),
         ('PROJCS["WGS 84 / UTM zone 32N",AUTHORITY["EPSG","32632"]]', "EPSG:32632"), (SHORTENED, "EPSG:32632"),
         ('LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],UNIT["metre",1]]', ""), ("Local", ""),
+        ("+proj=local +units=m", ""),
     ],
 )  # fmt: skip
 def test_systems_in_metres_and_degrees(text, crs):

@@ -16,7 +16,9 @@ from aerotri.crs_text import crs_text, system_in_words
 if TYPE_CHECKING:
     from pyproj import CRS
 
-LOCAL_NAMES = re.compile(r"local\b.*|arbitrary|none|lsr|local_cs\[.*|engcrs\[.*|engineeringcrs\[.*", re.IGNORECASE)
+LOCAL_NAMES = re.compile(
+    r"(?:\+proj=)?local\b.*|arbitrary|none|lsr|local_cs\[.*|engcrs\[.*|engineeringcrs\[.*", re.IGNORECASE
+)
 UTM = re.compile(
     r"(?:(?P<datum>WGS\s?84|ETRS\s?89|NAD\s?83|ED\s?50)\s*/?\s*)?UTM\s*(?:zone)?\s*(?P<zone>\d{1,2})\s*(?P<half>[NS])",
     re.IGNORECASE,
