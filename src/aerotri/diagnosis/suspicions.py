@@ -50,14 +50,23 @@ def suspicions(block: Block, found: Inventory, angle_unit: str) -> tuple[str, ..
         *_lonely(block, found),
         *_apart(found),
         *_alike(block),
-        *suspicions_of_lists(block),
+        *_places(block),
+        *_units(block),
         *_angle_unit(block, angle_unit),
     )
 
 
 def suspicions_of_lists(block: Block) -> tuple[str, ...]:
-    """Sentences about places and units of what was put together: the same for every command that reads lists."""
-    return (*_places(block), *_formats(block), *_pixels(block), *_control_sigma(block))
+    """Sentences about places and units of what was put together: the same for every command that reads lists.
+
+    Start values of photographs may be in axes of their own, so places are compared with GNSS positions alone.
+    """
+    return (*(() if block.gnss_ins is None else _places(block)), *_units(block))
+
+
+def _units(block: Block) -> tuple[str, ...]:
+    """Sentences about what seems to be in another unit."""
+    return (*_formats(block), *_pixels(block), *_control_sigma(block))
 
 
 def _lonely(block: Block, found: Inventory) -> list[str]:

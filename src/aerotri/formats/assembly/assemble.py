@@ -295,7 +295,7 @@ def with_positions(reading: Reading, given: PositionList, stated: Statements) ->
         xyz = placing.near_in_crs(xyz, given.crs, block.crs, stated.geoid, near, given.path)
     placing.refuse_heights(given.images[rows], xyz[:, 2], block.crs, placing.HIGHEST_FLIGHT_M, given.path)
     placing.refuse_far_off(block.control.xyz, xyz, given.path)
-    placing.refuse_far_off(xyz, block.images.centre, given.path)
+    placing.refuse_far_off(xyz, block.images.centre, given.path, may_be_free=True)
     sigma = given_or_stated(given.sigma[rows], stated.positions_sigma_m, given.path, "--positions-sigma-m")
     unknown = no_sigma(len(rows))
     observed = GnssIns(image, xyz, sigma, unknown, unknown, unknown[:, 0])

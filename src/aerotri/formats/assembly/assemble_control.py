@@ -61,7 +61,9 @@ def with_control(reading: Reading, given: PointList, stated: Statements, may_be_
     xyz, said = _in_block(block, given, stated, flown)
     messages += said
     placing.refuse_heights(names, xyz[:, 2], block.crs, placing.HIGHEST_GROUND_M, given.path)
-    placing.refuse_far_off(xyz[measured] if measured.any() else xyz, flown, given.path)
+    in_use = xyz[measured] if measured.any() else xyz
+    placing.refuse_far_off(in_use, observed, given.path)
+    placing.refuse_far_off(in_use, block.images.centre, given.path, may_be_free=True)
     known = np.isfinite(xyz)
     sigma = np.where(known, given.sigma, 1.0)
     sigma = np.where(known, given_or_stated(sigma, stated.control_sigma_m, given.path, "--control-sigma-m"), np.nan)

@@ -256,12 +256,16 @@ def in_axes_at(oriented: OrientedBlock, origin: np.ndarray, geoid: FilePath | No
     return _in_frame(oriented, topocentric_frame(oriented.block.crs, origin, geoid))
 
 
-def refuse_far_off(points: np.ndarray, photographs: np.ndarray, file: os.PathLike[str]) -> None:
+def refuse_far_off(
+    points: np.ndarray, photographs: np.ndarray, file: os.PathLike[str], may_be_free: bool = False
+) -> None:  # fmt: skip
     """Refuse coordinates that lie far from the photographs: in another system, or with X and Y exchanged.
 
     Parameters
     ----------
     points : (k, 3) m of `file`. photographs : (n, 3) m. NaN where unknown.
+    may_be_free : whether the photographs may be in axes of their own, as start values are: being far off says nothing
+        then, but that exchanging X and Y brings both together does.
 
     Raises
     ------
@@ -274,10 +278,11 @@ def refuse_far_off(points: np.ndarray, photographs: np.ndarray, file: os.PathLik
     size = max(float(np.ptp(xy, axis=0).max()) for xy in (one, other))
     if apart <= max(FAR_M, FAR_SIZES * size):
         return
-    message, remedy = f"lies {apart / 1e3:.0f} km from the photographs", OTHER_SYSTEM
+    message = f"lies {apart / 1e3:.0f} km from the photographs"
     if exchanged < NEARER * apart:
-        message, remedy = f"{message}, {exchanged / 1e3:.3g} km with X and Y exchanged", OTHER_AXES
-    raise InputError(message, remedy, file)
+        raise InputError(f"{message}, {exchanged / 1e3:.3g} km with X and Y exchanged", OTHER_AXES, file)
+    if not may_be_free:
+        raise InputError(message, OTHER_SYSTEM, file)
 
 
 def refuse_heights(names: np.ndarray, heights: np.ndarray, crs: str, highest: float, file: os.PathLike[str]) -> None:
