@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from aerotri.commands.console import Console
 from aerotri.execution.choice import THREADS, chosen
@@ -59,7 +59,7 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
             orientation=o.orientation or None, camera=o.camera.file, focal_length_mm=o.camera.focal_length_mm,
             pixel_um=o.camera.pixel_um, free_interior=o.camera.free, crs=stated.crs, geoid=stated.geoid,
             control_sigma_m=stated.control_sigma_m, control_prefix=stated.control_prefix,
-            axes=stated.axes, columns=stated.columns,
+            axes=cast(Any, stated.axes), columns=stated.columns,
             mark_sigma_px=o.mark_sigma_px, positions_sigma_m=stated.positions_sigma_m,
             orientation_sigma_m=stated.orientation_sigma_m, orientation_sigma_deg=stated.orientation_sigma_deg,
             points=o.points, features=o.features, feature_size=o.feature_size_px, neighbours=o.neighbours, seed=o.seed,

@@ -56,7 +56,8 @@ def _stands_apart(reader: RasterReader, value: float, there: np.ndarray, rows: n
     chosen = places[np.unique(np.linspace(0, len(places) - 1, WINDOWS).astype(int))]
     at_edge, elsewhere = [], []
     for i, j in chosen.tolist():
-        piece = reader.read(rows[i] - WINDOW // 2, columns[j] - WINDOW // 2, WINDOW, WINDOW).astype(float)
+        top, left = int(rows[i]) - WINDOW // 2, int(columns[j]) - WINDOW // 2
+        piece = reader.read(top, left, WINDOW, WINDOW).astype(float)
         for one, other in ((piece[:, 1:], piece[:, :-1]), (piece[1:], piece[:-1])):
             step = np.abs(one - other)
             inside = (one == value).astype(int) + (other == value)

@@ -130,7 +130,7 @@ def read_metashape_project(path: FilePath, pixel_um: float | None = None) -> Rea
     cameras = tuple(sensor.camera for sensor in photographs.sensors.values())
     rigs, station = _rigs(photographs)
     centre, rotation, of_parts = _poses(photographs, chunk, path)
-    known = np.isfinite(centre).all(axis=1)
+    known = np.asarray(np.isfinite(centre).all(axis=1))
     if of_parts:
         # their tie points have places in axes that lead nowhere
         meeting = np.bincount(ties.point[known[ties.image]] - len(labels), minlength=len(start)) > 0
