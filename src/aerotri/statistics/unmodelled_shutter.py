@@ -87,7 +87,9 @@ def unmodelled_shutter(system: NormalSystem, solution: Solution, adjusted: Adjus
     unit, k = adjusted.outcome.sigma0 * _total(adjusted), step.worst
     sigma = unit * step.root
     p = min(1.0, len(step.way) * _chance(float(step.way[k] / sigma[k])))
-    moves = step.points / adjusted.points.total_sigma[system.unknowns.points]
+    sigma_of_points = adjusted.points.total_sigma[system.unknowns.points]
+    # points that are held have no σ, and do not move
+    moves = step.points / np.where(sigma_of_points > 0.0, sigma_of_points, np.nan)
     camera = next(camera for camera in block.cameras if camera.name == step.cameras[k])
     found = UnmodelledShutter(
         camera.name, 1e-3 * float(step.way[k]), 1e-3 * float(sigma[k]), p, float("nan"),
