@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 from aerotri.conventions import InputError
+from aerotri.formats.assembly.kinds import ReadingOptions, read_control
 from aerotri.formats.block.folder import read_block
+from places import PROJECT
 
 CAMERA = (
     "--camera-name drone --camera-size 640x480 --pixel-um 7.5 --focal-length-mm 4.8 --image-sigma-px 0.1 "
     "--flight-axis +y --free-interior"
 )
+DRONE_SITE = PROJECT / "blocks" / "drone_site" / "photographs"
 C01 = [679974.593452, 5330000.96234, 519.994537]
 
 
@@ -98,3 +101,29 @@ def test_letters_of_windows(door, run):
     found = run(f"{words} {CAMERA} --crs EPSG:32632")
     assert found.exit_code == 0
     assert "g6.csv:11: not UTF-8, read as Windows-1252: 'Straße1,679974.0,5330000.0,519.0'" in found.output
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("m01_wrong_epsg", r"lies 44\d km from the photographs"),
+        ("m02b_latlon", "longitude and latitude exchanged"),
+        ("m13_mm_heights", r"the height of 'C01' would be 519995 m"),
+        ("m16_vertical_header", r"the heights of EPSG:32632\+5783"),
+    ],
+)
+def test_lists_that_do_not_belong_to_the_photographs(door, run, name, says):
+    """Refused before anything is matched."""
+    folder = door("gcp_list_headers")
+    with pytest.raises(InputError, match=says):
+        run(f"tiepoints {DRONE_SITE} --gcp {folder}/{name}_gcp_list.txt --control-sigma-m 0.02 --out OUT")
+
+
+def test_markers_of_metashape(door):
+    """The coordinates of the survey, never those that Metashape estimates; the line of totals is no point."""
+    folder = door("metashape_markers")
+    for name, sigma in (("m17_metashape_markers.csv", 0.02), ("m17b_metashape_markers.txt", np.nan)):
+        found = read_control(str(folder / name), ReadingOptions())
+        np.testing.assert_allclose(found.xyz[0], C01, atol=1e-6)
+        np.testing.assert_array_equal(found.sigma[0], [sigma] * 3)
+        assert "Total error" not in found.points
