@@ -58,7 +58,10 @@ def test_what_is_no_system(text):
     ("text", "says"),
     [
         ("+proj=utm +zone=32 +ellps=bessel +towgs84=500,0,0", "states a shift of the datum"),
-        ("+proj=utm +zone=32 +datum=WGS84 +geoidgrids=egm96_15.gtx", "names a grid"),
+        (
+            "+proj=utm +zone=32 +datum=WGS84 +geoidgrids=egm96_15.gtx",
+            r"states \+geoidgrids=egm96_15\.gtx, which is not used",
+        ),
         ("EPSG:4978", "earth-centred"),
     ],
 )
@@ -70,3 +73,12 @@ def test_what_is_understood_and_cannot_be_used(text, says):
 def test_a_system_without_a_code_keeps_its_definition():
     found = stated_system("+proj=laea +lat_0=50 +lon_0=10 +ellps=GRS80")
     assert "Lambert Azimuthal Equal Area" in found.crs
+
+
+@pytest.mark.parametrize(
+    "text", ["+proj=utm +zone=32 +datum=WGS84 +pm=paris", "+proj=utm +zone=32 +datum=WGS84 +axis=neu",
+             "+proj=pipeline +step +proj=utm +zone=32", "ESRI:102003+EPSG:5703"],
+)  # fmt: skip
+def test_no_key_is_dropped(text):
+    with pytest.raises(InputError, match=r"which is not used|has no EPSG code"):
+        stated_system(text)

@@ -11,14 +11,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import InputError
-from aerotri.crs_text import crs_text, system_in_words
+from aerotri.crs_text import crs_text, heights_of, plan_of, system_in_words
 
 if TYPE_CHECKING:
     from pyproj import CRS
 
 LOCAL_NAMES = re.compile(
-    r"(?:\+proj=)?local\b.*|arbitrary|none|lsr|local_cs\[.*|engcrs\[.*|engineeringcrs\[.*", re.IGNORECASE
+    r"local(?: coordinates)?(?: \((?:m|metres?|meters?)\))?|\+proj=local(?: \+units=m)?|arbitrary|none|lsr",
+    re.IGNORECASE,
 )
+LOCAL_WKT = re.compile(r"(?:local_cs|engcrs|engineeringcrs)\[", re.IGNORECASE)
+UNIT_WKT = re.compile(r'UNIT\["[^"]*",\s*([0-9.eE+-]+)')
+NOT_USED = re.compile(r"\+(?:geoidgrids|nadgrids|geoid_crs|pm=(?!0|greenwich)|axis=(?!enu)|proj=pipeline)[^ ]*")
 UTM = re.compile(
     r"(?:(?P<datum>WGS\s?84|ETRS\s?89|NAD\s?83|ED\s?50)\s*/?\s*)?UTM\s*(?:zone)?\s*(?P<zone>\d{1,2})\s*(?P<half>[NS])",
     re.IGNORECASE,
@@ -26,7 +30,7 @@ UTM = re.compile(
 CODES = re.compile(r"EPSG:\s*(\d{1,6})(?:\s*\+\s*(?:EPSG:)?\s*(\d{1,6}))?", re.IGNORECASE)
 AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d{1,6})"?\]\s*\]\s*$')
 UNIT_IN_NAME = re.compile(r"\s*\((?:ftUS|ft|US survey foot|foot)\)$")
-REMEDY = "name the system of the coordinates: --crs EPSG:n, or EPSG:n+m with m the system of the heights"
+REMEDY = "write it as EPSG:n, or EPSG:n+m with m the system of the heights; or remove the line, and state it: --crs"
 LONGEST = 20_000
 """Characters of a definition at most [C]."""
 
@@ -56,20 +60,34 @@ def stated_system(text: str) -> StatedSystem | None:
     InputError
         Where it is understood, but states something that cannot be taken into account.
     """
-    plain = text.strip().strip("'\"").strip()
+    plain = text.strip().strip("'\"").rstrip(",; ").strip()
     if not plain or len(plain) > LONGEST:
         return None
     if LOCAL_NAMES.fullmatch(plain):
         return StatedSystem("")
+    if LOCAL_WKT.match(plain):
+        factor = float(found[1]) if (found := UNIT_WKT.search(plain)) else 1.0
+        note = f"local coordinates of a unit of {factor:.7g} m, brought to metres" if factor != 1.0 else ""
+        return StatedSystem("", factor, factor, note)
     utm, codes = UTM.fullmatch(plain), CODES.fullmatch(plain)
     if utm is not None:
         plain = f"{_datum(utm['datum'])} / UTM zone {int(utm['zone'])}{utm['half'].upper()}"
     elif codes is not None:
         plain = "+".join(f"EPSG:{int(code)}" for code in codes.groups() if code)
-    if "+geoidgrids" in plain or "+nadgrids" in plain:
-        raise InputError(f"the coordinate system '{text.strip()[:120]}' names a grid, which is not used", REMEDY)
+    left = NOT_USED.search(plain)
+    if left is not None:
+        raise InputError(f"the coordinate system '{plain[:120]}' states {left[0]}, which is not used", REMEDY)
     system = _read(plain) or _of_damaged(plain)
     return None if system is None else _in_metres(_without_shift(system, text), text)
+
+
+def geographic_of(crs: str) -> str:
+    """The system of longitude and latitude below another one, with the same system of heights."""
+    from pyproj import CRS
+
+    below = CRS.from_user_input(plan_of(crs)).geodetic_crs
+    found, heights = crs_text(None if below is None else below.to_2d()), heights_of(crs)
+    return f"{found}+{heights}" if heights.isdigit() and found.startswith("EPSG:") else found
 
 
 def _datum(name: str | None) -> str:
@@ -106,6 +124,9 @@ def _without_shift(system: CRS, text: str) -> CRS:
     """
     if system.source_crs is None or not system.is_bound:
         return system
+    if system.source_crs.to_epsg() is not None:
+        # the shift to WGS 84 beside a known system is one of several, and not needed to know which system it is
+        return system.source_crs
     operation = system.coordinate_operation
     if operation is None or any(float(value) for value in operation.towgs84):
         raise InputError(f"the coordinate system '{text[:80]}' states a shift of the datum, which is not used", REMEDY)
@@ -125,9 +146,9 @@ def _in_metres(system: CRS, text: str) -> StatedSystem:
     found = crs_text(flat if plan == 1.0 else _metric(flat))
     if len(parts) > 1:
         vertical = crs_text(parts[1] if height == 1.0 else _metric(parts[1])).removeprefix("EPSG:")
-        if not vertical.isdigit():
-            raise InputError(f"the system of the heights in '{text[:80]}' has no EPSG code", REMEDY)
-        found = f"{found}+{vertical}" if found.startswith("EPSG:") else found
+        if not vertical.isdigit() or not parts[1].is_vertical or not found.startswith("EPSG:"):
+            raise InputError(f"the system of the heights or that of X and Y in '{text[:80]}' has no EPSG code", REMEDY)
+        found = f"{found}+{vertical}"
     units = [
         f"{what} in {axis.unit_name}"
         for what, axis, factor in (("X and Y", axes[0], plan), ("heights", (heights or axes)[0], height))

@@ -118,7 +118,11 @@ def test_one_result(tmp_path, program, seed):
     assert found.points.tolist() == list(NAMES)
     np.testing.assert_allclose(found.xyz, XYZ, rtol=0, atol=2e-6)
     assert found.crs == ("EPSG:32632" if program.startswith("Metashape") else "")
-    wanted = {"Pix4D with names": SIGMA[:, [0, 0, 2]], "Emlid Reach": SIGMA, "Metashape markers": SIGMA}.get(program)
+    wanted = {
+        "Pix4D with names": SIGMA[:, [0, 0, 2]],
+        "Emlid Reach": SIGMA * UNITS[unit],
+        "Metashape markers": SIGMA,
+    }.get(program)
     if wanted is None:
         assert np.isnan(found.sigma).all()
     else:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted, mm_from_px
+from aerotri.crs_text import refuse_other_system
 from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.names_match import match_photographs
 from aerotri.formats.assembly.parts import OrientationList, PositionList, RayList, Reading, no_sigma
@@ -195,6 +196,9 @@ def with_orientations(reading: Reading, given: OrientationList, stated: Statemen
         orientations are to be observations beside others.
     """
     block = reading.block
+    if given.crs:
+        refuse_local(block, given.crs, given.path)
+        refuse_other_system(given.crs, block.crs, "the block", given.path)
     index, loosely = match_photographs(given.images, block.images.names)
     _refuse_strangers(given.images, index, block, given.path)
     said = _about_names(given.path.name, given.images, index, loosely, block.images.names)
@@ -293,6 +297,9 @@ def with_positions(reading: Reading, given: PositionList, stated: Statements) ->
         refuse_local(block, given.crs, given.path)
         near = np.vstack([block.control.xyz, block.images.centre])
         xyz = placing.near_in_crs(xyz, given.crs, block.crs, stated.geoid, near, given.path)
+    elif given.heights and "+" in block.crs:
+        xyz = placing.from_ellipsoidal_heights(xyz, block.crs, stated.geoid)
+        messages.append(f"{given.path.name}: ellipsoidal heights were brought to those of {block.crs}")
     placing.refuse_heights(given.images[rows], xyz[:, 2], block.crs, placing.HIGHEST_FLIGHT_M, given.path)
     placing.refuse_far_off(block.control.xyz, xyz, given.path)
     placing.refuse_far_off(xyz, block.images.centre, given.path, may_be_free=True)

@@ -95,12 +95,12 @@ ORIENTATIONS: Kinds = {
 }
 POSITIONS: Kinds = {
     "odm-geo": (is_odm_geo, lambda path, options: read_odm_geo(path, options.exchanged)),
-    "csv": (is_named_list, lambda path, options: read_positions(path, options.columns)),
+    "csv": (is_named_list, lambda path, options: read_positions(path, options.columns, options.exchanged)),
     "pix4d-geo": (is_pix4d_geo, lambda path, options: read_pix4d_geo(path, options.axes)),
 }
 CONTROL: Kinds = {
     "odm-gcp": (is_odm_gcp, lambda path, options: read_odm_gcp(path, options.exchanged)),
-    "csv": (is_named_list, lambda path, options: read_control_list(path, options.columns)),
+    "csv": (is_named_list, lambda path, options: read_control_list(path, options.columns, options.exchanged)),
     "pix4d-gcp": (is_pix4d_gcp, lambda path, options: read_pix4d_gcp(path, options.axes)),
     "ign-app": (is_ign_app, lambda path, _: read_ign_app(path)),
     "patb-con": (is_patb_con, lambda path, _: read_patb_con(path)),

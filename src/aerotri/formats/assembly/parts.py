@@ -54,6 +54,7 @@ class OrientationList:
         `rotation` is the first of them. Reprojection decides.
     first_unless : whether the first choice stands where reprojection cannot tell; else that is an error.
     messages : what the user should know.
+    crs : coordinate system where the file names it, else ''.
     """
 
     path: Path
@@ -64,6 +65,7 @@ class OrientationList:
     choices: tuple[tuple[str, np.ndarray], ...] = ()
     first_unless: bool = False
     messages: tuple[str, ...] = ()
+    crs: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +81,7 @@ class PositionList:
         roll 0 for a photograph that looks straight down.
     crs : coordinate system where the file names it, else ''.
     messages : what the user should know.
+    heights : 'ellipsoidal' where the file calls them so, else ''.
     """
 
     path: Path
@@ -88,6 +91,7 @@ class PositionList:
     yaw_pitch_roll: np.ndarray
     crs: str = ""
     messages: tuple[str, ...] = ()
+    heights: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ BODY = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 FAR_M, FAR_SIZES = 1e4, 3.0
 """Distance of points from the photographs, in m and in sizes of the larger area, beyond which both are not in one
 system; chosen [C]: below the differences of X and Y in most systems, beyond the way from a block to its control."""
-HIGHEST_GROUND_M, HIGHEST_FLIGHT_M = 1e4, 3e4
+HIGHEST_GROUND_M, HIGHEST_FLIGHT_M = 9e3, 3e4
 """Heights beyond these are none of ground and of an aircraft [C]."""
 OTHER_SYSTEM = "are both in the same coordinate system? correct the one that the list names, or state it: --crs"
 OTHER_AXES = "state the order of the axes: --axes yx (or xy)"

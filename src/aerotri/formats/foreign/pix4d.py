@@ -18,7 +18,7 @@ from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
-from aerotri.formats.foreign.named_lists import is_named
+from aerotri.formats.foreign.named_lists import is_named, system_above
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, check_words, first_lines
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
@@ -109,10 +109,10 @@ def read_pix4d_gcp(path: FilePath, axes: str = "xy") -> PointList:
         With the line.
     """
     file, names, values = _rows(Path(path), GCP_WIDTHS, "label,c1,c2,z, then acc_h,acc_v or not", "point")
-    xyz, sigma = _ordered(values[:, :3], axes), _spread(file, values[:, 3:], may_be_zero=True)
-    return PointList(
-        file.path, texts(names), xyz, sigma, np.zeros(len(names), bool), messages=_guessed(file, values, axes)
-    )
+    xyz, crs, said = _placed(file, values[:, :3], axes)
+    sigma = _spread(file, values[:, 3:], may_be_zero=True)
+    messages = (*_guessed(file, values, axes), *said)
+    return PointList(file.path, texts(names), xyz, sigma, np.zeros(len(names), bool), crs, messages=messages)
 
 
 def read_pix4d_geo(path: FilePath, axes: str = "xy") -> PositionList:
@@ -132,8 +132,16 @@ def read_pix4d_geo(path: FilePath, axes: str = "xy") -> PositionList:
     has_angles = values.shape[1] > 5
     angles = np.radians(values[:, 3:6]) if has_angles else no_sigma(len(names))
     sigma = _spread(file, values[:, 6 if has_angles else 3 :])
-    said = _guessed(file, values, axes, has_angles)
-    return PositionList(file.path, texts(names), _ordered(values[:, :3], axes), sigma, angles, messages=said)
+    xyz, crs, said = _placed(file, values[:, :3], axes)
+    messages = (*_guessed(file, values, axes, has_angles), *said)
+    return PositionList(file.path, texts(names), xyz, sigma, angles, crs, messages)
+
+
+def _placed(file: TextFile, values: np.ndarray, axes: str) -> tuple[np.ndarray, str, tuple[str, ...]]:
+    """(n, 3) m in the order X, Y, Z, the system that a comment names, and what to say of it."""
+    system, said = system_above(file.path)
+    to_metre = np.array([system.plan_to_metre, system.plan_to_metre, system.height_to_metre])
+    return _ordered(values, axes) * to_metre, system.crs, said
 
 
 def _guessed(file: TextFile, values: np.ndarray, axes: str, has_angles: bool = False) -> tuple[str, ...]:

@@ -32,9 +32,12 @@ WORDS: dict[str, tuple[str, ...]] = {
     ),
     "Z": (
         "z", "zgps", "z0", "height", "h", "altitude", "alt", "elevation", "elev", "orthometricheight", "orthoheight",
-        "hohe", "hoehe", "nhn", "hauteur", "altitud", "altura", "cota", "quota", "hoogte", "zaltitude",
+        "hohe", "hoehe", "nhn", "hauteur", "altitud", "altura", "cota", "quota", "hoogte", "zaltitude", "ht", "orthoht",
     ),
-    "h_ell": ("ellipsoidalheight", "ellheight", "ellipsoidheight", "ellipsoidischehohe", "heightell", "hae"),
+    "h_ell": (
+        "ellipsoidalheight", "ellheight", "ellipsoidheight", "ellipsoidischehohe", "heightell", "hae", "ellipht",
+        "ellht", "hell", "wgs84height",
+    ),
     "lon": ("longitude", "lon", "long", "lng", "langengrad", "lange", "laenge", "longitud", "longitudine"),
     "lat": ("latitude", "lat", "breitengrad", "breite", "latitud", "latitudine"),
     "sX": ("sx", "xacc", "accx", "sx0", "sigmae", "se", "stdx", "sdx", "sigmax"),
@@ -68,8 +71,10 @@ NO_COORDINATE = (
     "adjusted", "velocity", "antenna", "pole", "base", "offset",
 )  # fmt: skip
 """Words of columns that repeat what was measured, as another program sees it."""
-PLAN = ("hor", "horizontal", "plan", "xy", "lateral", "planimetric", "lage")
-HEIGHT = ("ver", "vertical", "v", "u", "up")
+NEUTRAL = ("grid", "utm", "local", "coord", "coordinate", "gps")
+"""Words that say nothing of the axis."""
+PLAN = ("hor", "horz", "horizontal", "plan", "xy", "lateral", "planimetric", "lage")
+HEIGHT = ("ver", "vert", "vertical", "v", "u", "up")
 US_FOOT = 1200.0 / 3937.0
 LENGTHS = {
     "m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3,
@@ -108,7 +113,8 @@ def list_column(name: str) -> ListColumn:
         return ListColumn(name, "")
     stated = re.findall(r"[(\[{]([^)\]}]*)[)\]}]", name)
     words = _words(re.sub(r"[(\[{][^)\]}]*[)\]}]", " ", name))
-    unit = next((text.strip() for text in stated if text.strip()), "")
+    texts = [text.strip() for text in stated if text.strip()]
+    unit = next((text for text in texts if is_unit(text)), texts[0] if texts else "")
     if not stated:
         words, unit = _without_unit(words)
     meaning = _meaning(words)
@@ -118,10 +124,17 @@ def list_column(name: str) -> ListColumn:
     if meaning.startswith("s") and key in ANGLES:
         # an accuracy of angles
         return ListColumn(name, "", unit)
+    if meaning == "Z" and key.startswith("ellips"):
+        return ListColumn(name, "h_ell")
     if meaning in ("X", "Y") and key in ANGLES:
         meaning = "lon" if meaning == "X" else "lat"
     known = ANGLES if meaning in IN_DEGREES else LENGTHS if meaning in IN_METRES else {}
     return ListColumn(name, meaning, unit, known.get(key, float("nan")))
+
+
+def looks_like_unit(text: str) -> bool:
+    """Whether a text in brackets that is no unit here states one, a side, or how sure a value is."""
+    return re.search(r"f(?:ee|oo)?t|inch|yd|yard|\bdm|mmss|sec|%|σ|sigma|^[WS]$", text, re.IGNORECASE) is not None
 
 
 def is_unit(text: str) -> bool:
@@ -144,7 +157,7 @@ def _without_unit(words: list[str]) -> tuple[list[str], str]:
 
 def _words(name: str) -> list[str]:
     """Lower case words of letters and digits without accents; ImageName has two."""
-    plain = unicodedata.normalize("NFKD", name.replace("ß", "ss").replace("σ", "sigma"))
+    plain = unicodedata.normalize("NFKD", re.sub("[Nn]°", "no ", name).replace("ß", "ss").replace("σ", "sigma"))
     plain = "".join(c for c in plain if not unicodedata.combining(c))
     parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", plain)
     return re.findall(r"[a-z0-9]+", parted.lower())
@@ -156,6 +169,11 @@ def _meaning(words: list[str]) -> str:
     found = _of_word("".join(words))
     if found:
         return found
+    if len(words) == 2 and words[0] in ("point", "gps") and words[1] in LETTERS[:3]:
+        words = words[1:]
+    words = [word for word in words if word not in NEUTRAL] or words
+    if _of_word("".join(words)):
+        return _of_word("".join(words))
     accuracy = [word for word in words if word in ACCURACY]
     if accuracy:
         return _accuracy_of([word for word in words if word not in ACCURACY])

@@ -14,7 +14,7 @@ from aerotri.formats.text.csv_text import read_bytes
 from aerotri.formats.text.encodings import decoded, head_decoded
 from aerotri.formats.text.tables import CONTROL_CHARACTERS, LARGEST_NUMBER, LONGEST_NAME, NUMBER
 
-HEAD = 4096
+HEAD = 32768
 """Bytes from which the kind of a file is told."""
 
 
@@ -24,7 +24,8 @@ class TextFile:
     Parameters
     ----------
     path : the file.
-    comments : whether lines that begin with # are left out. any_letters : whether UTF-16 and Windows-1252 are read too.
+    comments : whether lines that begin with # are left out. keep_tabs : whether tabs at the ends of lines stay, which
+        stand for empty cells. any_letters : whether UTF-16 and Windows-1252 are read too.
     part : bytes of some lines of the file, where not all are meant. first_line : number of the first of them.
 
     Raises
@@ -40,12 +41,13 @@ class TextFile:
         part: bytes | None = None,
         first_line: int = 1,
         any_letters: bool = False,
+        keep_tabs: bool = False,
     ):
         self.path = path
         found = decoded(read_bytes(path) if part is None else part, path, first_line, any_letters)
         self.notes = (found.note,) if found.note else ()
         raw = found.text.split("\n")
-        lines = [line.strip() for line in raw]
+        lines = [line.strip(" \r\v\f") if keep_tabs and line.strip() else line.strip() for line in raw]
         kept = [(i, line) for i, line in enumerate(lines) if line and not (comments and line[0] == "#")]
         self.numbers = [i + first_line for i, _ in kept]
         self.lines = [line for _, line in kept]
