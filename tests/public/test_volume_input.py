@@ -160,10 +160,15 @@ def test_heights_that_land_does_not_have_are_told(tmp_path, cone):
 def test_heights_of_the_base_that_land_does_not_have_are_told(tmp_path, cone):
     z = heights(with_cone=False)
     z[95:105, 55:65] = -9999.0
-    said = "the base (hole.tif) has heights from -9999 to"
-    found = aerotri.volume(cone, AROUND, base=in_file(tmp_path / "hole.tif", z, no_data=None))
+    with pytest.raises(InputError, match=r"hole\.tif: has cells of exactly -9999 m") as refused:
+        aerotri.volume(cone, AROUND, base=in_file(tmp_path / "hole.tif", z, no_data=None))
+    assert "gdal_edit.py -a_nodata -9999" in refused.value.remedy
+    z[95:105, 55:65] = -9000.0
+    said = "the base (odd.tif) has heights from -9000 to"
+    found = aerotri.volume(cone, AROUND, base=in_file(tmp_path / "odd.tif", z, no_data=None))
     assert [text for text in found.warnings if said in text and "does its file state its value for no data" in text]
     assert not any("the surface has heights" in text for text in found.warnings)
+    z[95:105, 55:65] = -9999.0
     known = aerotri.volume(cone, AROUND, base=in_file(tmp_path / "known.tif", z))
     assert not any("has heights from" in text for text in known.warnings)
     level = aerotri.volume(cone, AROUND, base=10_000.0).warnings
@@ -525,8 +530,10 @@ def test_what_is_told_of_large_areas_of_a_change_has_no_powers_of_ten():
 
 
 def test_what_is_told_of_large_parts_of_sigma_has_no_powers_of_ten():
+    off = SimpleNamespace(settings=SimpleNamespace(adjustment=SimpleNamespace(model_part="off")))
     part = SimpleNamespace(unseen=1234567.0, between=None, calibration=SimpleNamespace(
-        local=SimpleNamespace(model_part=None)))  # fmt: skip
+        local=SimpleNamespace(model_part=None),
+        system=SimpleNamespace(unknowns=SimpleNamespace(block=off))))  # fmt: skip
     unseen = _notes(part, None, SimpleNamespace(name=""), 0.0, SigmaOptions())[0]
     assert unseen.startswith("1235000 m² are seen by too few")
     assert "4e" not in _model_in_words(part, {"adjustment": 30000.0, "model": 40000.0})

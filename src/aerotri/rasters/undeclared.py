@@ -15,6 +15,7 @@ SAMPLE = 1000
 """Rows and columns of the sample in which a repeated value is sought [C]."""
 FEWEST = 10
 """Cells of one value in the sample that are looked at [C]: fewer do little harm, and two may be equal by chance."""
+USUAL = (0.0, -32768.0, -32767.0, 32767.0, 65535.0, -1.0)
 WINDOW, WINDOWS = 256, 16
 """Cells along a side of the pieces that are read whole, and how many at most [C]."""
 CLIFF_M, STEEP = 3.0, 10.0
@@ -36,6 +37,8 @@ def refuse_undeclared_no_data(reader: RasterReader) -> None:
     if len(known) < FEWEST:
         return
     for value in (float(known.min()), float(known.max())):
+        if not _is_usual(value):
+            continue
         there = sample == value
         rest = known[known != value]
         if there.sum() < FEWEST or len(rest) < FEWEST or not _stands_apart(reader, value, there, rows, columns):
@@ -48,6 +51,11 @@ def refuse_undeclared_no_data(reader: RasterReader) -> None:
             "value that does not occur, such as -a_nodata -9999",
             reader.path,
         )
+
+
+def _is_usual(value: float) -> bool:
+    """Whether programs fill holes with this value: 0, nines, or a limit of a type of numbers."""
+    return value in USUAL or abs(value) > 1e5 or set(f"{abs(value):.10g}") == {"9"}
 
 
 def _stands_apart(reader: RasterReader, value: float, there: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> bool:
