@@ -27,6 +27,7 @@ from aerotri.adjustment.adjusted_positions import at_adjusted_positions
 from aerotri.adjustment.carry_over import start_values_at, with_shared
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.point_sides import expand_sides
+from aerotri.adjustment.robust import normalised_lengths, scale_of
 from aerotri.adjustment.scanning import READOUT
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
@@ -51,6 +52,8 @@ LIKE_A_SHUTTER = ("affinity", "shear")
 """Of these, what a rolling shutter is to first order: looked at beside it, not taken for granted."""
 MOST_CAMERAS = 6
 """Cameras of a block that are tested, those with most photographs [C]: each has a column in the border."""
+GROSS = 4.0
+"""σ of most residuals beyond which a ray is no part of the test [C]: gross errors are no shutter."""
 FEWEST = 3
 """Photographs of a camera below which it is not tested [C]: a strip of two has a base and no redundancy in it."""
 
@@ -59,7 +62,8 @@ FEWEST = 3
 class _Step:
     """From an adjustment to the same with ways of cameras: ways (k,) mm and the roots of their cofactors by camera.
 
-    `points` (P, 3) m is what the way of the camera `worst`, the least likely one, moves them by.
+    `points` (P, 3) m is what the way of the camera `worst`, the least likely one, moves them by; `rows` (P,) of the
+    block's points they are.
     """
 
     cameras: tuple[str, ...]
@@ -67,6 +71,7 @@ class _Step:
     root: np.ndarray
     worst: int
     points: np.ndarray
+    rows: np.ndarray
 
 
 def unmodelled_shutter(system: NormalSystem, solution: Solution, adjusted: AdjustedBlock) -> UnmodelledShutter | None:
@@ -87,7 +92,7 @@ def unmodelled_shutter(system: NormalSystem, solution: Solution, adjusted: Adjus
     unit, k = adjusted.outcome.sigma0 * _total(adjusted), step.worst
     sigma = unit * step.root
     p = min(1.0, len(step.way) * _chance(float(step.way[k] / sigma[k])))
-    sigma_of_points = adjusted.points.total_sigma[system.unknowns.points]
+    sigma_of_points = adjusted.points.total_sigma[step.rows]
     # points that are held have no σ, and do not move
     moves = step.points / np.where(sigma_of_points > 0.0, sigma_of_points, np.nan)
     camera = next(camera for camera in block.cameras if camera.name == step.cameras[k])
@@ -162,7 +167,7 @@ def _step(system: NormalSystem, solution: Solution, block: Block) -> _Step | Non
     row, axis = np.nonzero(old.point_held)
     held = list(zip(old.points[row].tolist(), axis.tolist(), strict=True)) if len(row) else None
     status = np.ones(len(block.image_points), dtype=np.int8)
-    status[old.rays.source] = 0
+    status[old.rays.source[_without_gross(system, solution)]] = 0
     try:
         other, start = build_system(block, start_values_at(old, solution.state), status, held)
         state = with_shared(other.unknowns, old, start, solution.state)
@@ -184,7 +189,18 @@ def _step(system: NormalSystem, solution: Solution, block: Block) -> _Step | Non
     images, shared = np.ascontiguousarray(moved[: 6 * n].reshape(n, 6, 1)), np.ascontiguousarray(moved[6 * n :])
     nothing = np.zeros((len(other.unknowns.points), 3, 1))
     points = expand_sides(other, state, images, shared, nothing, estimator)[:, :, 0]
-    return _Step(tuple(other.unknowns.shared.groups[k] for k in columns), way, root, worst, points)
+    return _Step(
+        tuple(other.unknowns.shared.groups[k] for k in columns), way, root, worst, points, other.unknowns.points
+    )
+
+
+def _without_gross(system: NormalSystem, solution: Solution) -> np.ndarray:
+    """(m,) bool of the rays that are no gross errors, of points that two or more of these see."""
+    u = system.unknowns
+    length = normalised_lengths(solution.equations.residual, u.rays.inv_sigma)
+    keep = length <= GROSS * scale_of(length, 1.0)
+    point = np.repeat(np.arange(len(u.points)), np.diff(u.rays.start))
+    return keep & (np.bincount(point[keep], minlength=len(u.points))[point] > 1)
 
 
 def _with_strip_velocities(system: NormalSystem, state: State) -> NormalSystem:
