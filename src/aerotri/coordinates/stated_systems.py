@@ -10,6 +10,8 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from aerotri.conventions import InputError
 from aerotri.crs_text import crs_text, heights_of, plan_of, system_in_words
 
@@ -50,6 +52,11 @@ class StatedSystem:
     plan_to_metre: float = 1.0
     height_to_metre: float = 1.0
     note: str = ""
+
+    @property
+    def to_metre(self) -> np.ndarray:
+        """(3,) what X, Y, Z of a list are multiplied with."""
+        return np.array([self.plan_to_metre, self.plan_to_metre, self.height_to_metre])
 
 
 def stated_system(text: str) -> StatedSystem | None:

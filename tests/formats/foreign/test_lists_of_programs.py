@@ -7,7 +7,7 @@ import pytest
 
 from aerotri.conventions import InputError
 from aerotri.formats.assembly.kinds import ReadingOptions, read_control
-from aerotri.formats.foreign.named_lists import stated_columns
+from aerotri.formats.foreign.list_header import stated_columns
 
 NAMES = ("GCP1", "Straße 2", "77")
 XYZ = np.array([[679974.593, 5330000.962, 519.995], [680020.067, 5329984.429, -3.5], [679978.339, 5330007.875, 0.0]])

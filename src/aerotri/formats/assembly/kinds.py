@@ -14,15 +14,9 @@ from aerotri.formats.assembly.assemble import Statements
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, RayList
 from aerotri.formats.foreign.bingo import is_bingo, read_bingo
 from aerotri.formats.foreign.ign import is_ign_app, is_ign_mes, is_ign_opk, read_ign_app, read_ign_mes, read_ign_opk
+from aerotri.formats.foreign.list_header import is_named_list, is_named_orientations, stated_columns
 from aerotri.formats.foreign.metashape import is_metashape, read_metashape
-from aerotri.formats.foreign.named_lists import (
-    is_named_list,
-    is_named_orientations,
-    read_control_list,
-    read_named_orientations,
-    read_positions,
-    stated_columns,
-)
+from aerotri.formats.foreign.named_lists import read_control_list, read_named_orientations, read_positions
 from aerotri.formats.foreign.odm import is_odm_gcp, is_odm_geo, read_odm_gcp, read_odm_geo
 from aerotri.formats.foreign.orientation_list import is_orientation_list, read_orientation_list
 from aerotri.formats.foreign.patb import (

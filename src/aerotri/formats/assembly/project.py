@@ -35,8 +35,8 @@ from aerotri.formats.block.folder import read_block
 from aerotri.formats.foreign.bundler import read_bundler
 from aerotri.formats.foreign.colmap import read_colmap
 from aerotri.formats.foreign.ign import files_of, is_ign, is_ign_camera, read_ign_app, read_ign_camera, read_ign_mes
+from aerotri.formats.foreign.list_header import has_attitudes
 from aerotri.formats.foreign.metashape_project import read_metashape_project
-from aerotri.formats.foreign.named_lists import has_attitudes
 from aerotri.formats.foreign.opensfm import read_opensfm
 from aerotri.formats.foreign.pix4d import read_pix4d_offset
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images

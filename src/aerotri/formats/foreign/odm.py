@@ -19,6 +19,7 @@ from aerotri.coordinates.stated_systems import StatedSystem, stated_system
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.parts import PointList, PositionList, RayList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
+from aerotri.formats.foreign.list_systems import in_words, order_of_axes
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, check_words, first_lines, is_number
 from aerotri.observations import Block
@@ -86,7 +87,7 @@ def _begin(path: Path, form: str) -> tuple[TextFile, StatedSystem, tuple[str, ..
         raise file.error(0, error.message, FIRST_LINE) from error
     if system is None:
         raise file.error(0, f"the coordinate system '{file.lines[0][:80]}' is not known", FIRST_LINE)
-    return file, system, (*file.notes, *((f"{path.name}: {system.note}",) if system.note else ()))
+    return file, system, (*file.notes, *in_words(system, path))
 
 
 def read_odm_gcp(path: FilePath, exchanged: bool = False) -> PointList:
@@ -123,7 +124,7 @@ def read_odm_gcp(path: FilePath, exchanged: bool = False) -> PointList:
     place: dict[str, int] = {}
     image = np.array([image_place.setdefault(name, len(image_place)) for name in images], dtype=np.int64)
     point = np.array([place.setdefault(name, len(place)) for name in names], dtype=np.int64)
-    xyz = _places(file, rows, names, point, values[:, :3])[:, _order(exchanged)] * _factors(system)
+    xyz = _places(file, rows, names, point, values[:, :3])[:, order_of_axes(exchanged)] * system.to_metre
     file.refuse_repeated([f"{p}' in photograph '{i}" for p, i in zip(names, images, strict=True)], rows, "point")
     return PointList(
         path=file.path,
@@ -145,15 +146,6 @@ def read_odm_gcp(path: FilePath, exchanged: bool = False) -> PointList:
         ),
         messages=(*messages, *_about_heights(file.path, xyz[:, 2], "point")),
     )
-
-
-def _order(exchanged: bool) -> list[int]:
-    return [1, 0, 2] if exchanged else [0, 1, 2]
-
-
-def _factors(system: StatedSystem) -> np.ndarray:
-    """(3,) what X, Y, Z are multiplied with."""
-    return np.array([system.plan_to_metre, system.plan_to_metre, system.height_to_metre])
 
 
 def _point_names(words: list[list[str]], rows: list[int], values: np.ndarray) -> list[str]:
@@ -238,7 +230,7 @@ def read_odm_geo(path: FilePath, exchanged: bool = False) -> PositionList:
     return PositionList(
         file.path,
         texts(names)[there],
-        values[there][:, _order(exchanged)] * _factors(system),
+        values[there][:, order_of_axes(exchanged)] * system.to_metre,
         accuracy[there][:, [0, 0, 1]],
         angles[there],
         system.crs,

@@ -13,7 +13,7 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.parts import OrientationList, texts
-from aerotri.formats.foreign.named_lists import is_named
+from aerotri.formats.foreign.list_header import is_named
 from aerotri.formats.text.tables import LARGEST_FORMAT_PX, SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, first_lines
 from aerotri.functional_model.rotation import rotation_from_angles

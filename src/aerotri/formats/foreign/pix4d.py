@@ -18,7 +18,8 @@ from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
-from aerotri.formats.foreign.named_lists import is_named, system_above
+from aerotri.formats.foreign.list_header import is_named
+from aerotri.formats.foreign.list_systems import order_of_axes, system_above
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, check_words, first_lines
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
@@ -140,8 +141,7 @@ def read_pix4d_geo(path: FilePath, axes: str = "xy") -> PositionList:
 def _placed(file: TextFile, values: np.ndarray, axes: str) -> tuple[np.ndarray, str, tuple[str, ...]]:
     """(n, 3) m in the order X, Y, Z, the system that a comment names, and what to say of it."""
     system, said = system_above(file.path)
-    to_metre = np.array([system.plan_to_metre, system.plan_to_metre, system.height_to_metre])
-    return _ordered(values, axes) * to_metre, system.crs, said
+    return _ordered(values, axes) * system.to_metre, system.crs, said
 
 
 def _guessed(file: TextFile, values: np.ndarray, axes: str, has_angles: bool = False) -> tuple[str, ...]:
@@ -176,7 +176,7 @@ def _rows(path: Path, widths: tuple[int, ...], form: str, what: str) -> tuple[Te
 def _ordered(values: np.ndarray, axes: str) -> np.ndarray:
     if axes not in AXES:
         raise InputError(f"axes = '{axes}'", "xy or yx")
-    return values[:, [1, 0, 2]] if axes == "yx" else values
+    return values[:, order_of_axes(axes == "yx")]
 
 
 def _spread(file: TextFile, accuracy: np.ndarray, may_be_zero: bool = False) -> np.ndarray:

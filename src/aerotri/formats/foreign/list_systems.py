@@ -1,0 +1,81 @@
+"""The coordinate system that comments of a list name, whatever the list holds: used, refused, or named as not used."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from aerotri.conventions import InputError
+from aerotri.coordinates.stated_systems import REMEDY, StatedSystem, stated_system
+from aerotri.formats.text.text_lines import TextFile
+
+OF_SYSTEM = re.compile(
+    r"#\s*(?:(?:coordinate|reference|horizontal|koordinaten)\s*(?:reference\s*)?system|(?:horizontal\s*)?crs|srs|projection)"
+    r"(?:\s*\([^)]*\))?\s*[:=,]?\s+?(.+)|#\s*(EPSG[:,].+)",
+    re.IGNORECASE,
+)
+ABOUT_SYSTEM = re.compile(r"epsg|\bcrs\b|system|datum|units?\b|feet|height", re.IGNORECASE)
+"""Comments that may be about the system of the coordinates: where they are not understood, they are named."""
+OF_TOTALS = re.compile(r"#?\s*\"?total\s+error", re.IGNORECASE)
+
+
+def system_above(path: Path) -> tuple[StatedSystem, tuple[str, ...]]:
+    """The coordinate system that comments of a list without names state, and what to say of it.
+
+    Raises
+    ------
+    InputError
+    """
+    file = TextFile(path, comments=False, any_letters=True)
+    stated, notes = systems_of_comments(file, None)
+    system = one_system(file, stated) or StatedSystem("")
+    return system, (*in_words(system, path), *notes)
+
+
+def in_words(system: StatedSystem, path: Path) -> tuple[str, ...]:
+    """What to say of how the system of a list was understood; nothing where that is plain."""
+    return (f"{path.name}: {system.note}",) if system.note else ()
+
+
+def systems_of_comments(file: TextFile, header_line: int | None) -> tuple[list[tuple[int, str]], tuple[str, ...]]:
+    """Rows and texts of comments that name a system, and sentences on those that may and are not understood."""
+    stated, notes = [], []
+    for row, line in enumerate(file.lines):
+        if not line.startswith("#") or row == header_line or OF_TOTALS.match(line):
+            continue
+        found = OF_SYSTEM.match(line)
+        if found is not None:
+            stated.append((row, found[1] or found[2].replace(",", ":")))
+        elif ABOUT_SYSTEM.search(line):
+            notes.append(f"{file.path.name}:{file.numbers[row]}: '{line[:60]}' is not used")
+    return stated, tuple(notes)
+
+
+def one_system(file: TextFile, stated: Sequence[tuple[int, str]]) -> StatedSystem | None:
+    """The one system that all texts mean; None where there are none.
+
+    Raises
+    ------
+    InputError
+        When one is not known, or two are not the same.
+    """
+    found: StatedSystem | None = None
+    for row, text in stated:
+        try:
+            system = stated_system(text)
+        except InputError as error:
+            raise file.error(row, error.message, error.remedy) from error
+        if system is None:
+            raise file.error(row, f"the coordinate system '{text[:80]}' is not known", REMEDY)
+        if found is not None and (found.crs, found.plan_to_metre) != (system.crs, system.plan_to_metre):
+            raise file.error(
+                row, f"names several coordinate systems: '{text[:60]}' is another one", "leave one of them"
+            )
+        found = system
+    return found
+
+
+def order_of_axes(exchanged: bool) -> list[int]:
+    """Columns of X, Y, Z in coordinates whose first two may have changed places."""
+    return [1, 0, 2] if exchanged else [0, 1, 2]
