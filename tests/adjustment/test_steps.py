@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from aerotri.adjustment.damping import Damping
-from aerotri.adjustment.normal_equations import RightSide
 from aerotri.adjustment.prepare import prepare
+from aerotri.adjustment.reduced_equations import RightSide
 from aerotri.adjustment.robust import LEAST_SQUARES
 from aerotri.adjustment.secants import Secants
 from aerotri.adjustment.steps import Place, Trial, lengthened, until_better

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem, RightSide
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.reduced_equations import NormalEquations, RightSide
 from aerotri.adjustment.robust import LEAST_SQUARES
 from aerotri.adjustment.steps import COST_TOLERANCE, Place, Trial, assembled, place_at
 from aerotri.adjustment.stopping import is_negligible

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.adjustment.block_motions import FreeOfObservations, unnoticed_motions, weak_motions
-from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.null_space import SUSPECT, free_directions, smallest_eigenvalue
+from aerotri.adjustment.reduced_equations import NormalEquations
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import State

@@ -13,8 +13,9 @@ from scipy.linalg import eigh
 
 from aerotri.adjustment._null_space_kernels import add_products
 from aerotri.adjustment.kernel_records import Directions, Problem, Work
-from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.point_sides import expand_sides
+from aerotri.adjustment.reduced_equations import NormalEquations
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor
 from aerotri.adjustment.unknowns import State

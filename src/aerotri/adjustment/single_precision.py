@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.null_space import smallest_eigenvalue
 from aerotri.adjustment.panels import DOUBLE, SINGLE
+from aerotri.adjustment.reduced_equations import NormalEquations
 from aerotri.adjustment.secants import Secants
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.steps import Place, Trial, take_step

@@ -18,9 +18,10 @@ import numpy as np
 from aerotri.adjustment.chord_steps import follow
 from aerotri.adjustment.damping import Damping
 from aerotri.adjustment.defects import checked_factor, is_suspect, without_digits
-from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.panels import DOUBLE, SINGLE
 from aerotri.adjustment.parallel import blas_threads
+from aerotri.adjustment.reduced_equations import NormalEquations
 from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for
 from aerotri.adjustment.secants import Secants
 from aerotri.adjustment.settled_points import needs_settling, settled_points

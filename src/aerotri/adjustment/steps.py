@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from aerotri.adjustment.damping import LAST_DAMPING, Damping
-from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem, RightSide
+from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.panels import DOUBLE
+from aerotri.adjustment.reduced_equations import NormalEquations, RightSide
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.secants import Secants
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError

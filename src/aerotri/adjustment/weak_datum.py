@@ -29,7 +29,8 @@ from aerotri.adjustment.unknowns import State
 from aerotri.functional_model.observed_unknowns import Rows
 
 if TYPE_CHECKING:
-    from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+    from aerotri.adjustment.normal_equations import NormalSystem
+    from aerotri.adjustment.reduced_equations import NormalEquations
 
 WEAKEST = 1e-11
 """λ of a motion of the whole block from which on the normal matrix holds it to four digits or better."""

@@ -22,10 +22,11 @@ import numpy as np
 from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
 from aerotri.adjustment.carry_over import reference_state, start_values_at, with_shared
 from aerotri.adjustment.kernel_records import Inverse
-from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.point_sides import point_cofactors
 from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.ray_status import RayStatus, with_lonely_rays, with_weak_words
+from aerotri.adjustment.reduced_equations import NormalEquations
 from aerotri.adjustment.rigging import Rigging
 from aerotri.adjustment.robust import Estimator, normalised_lengths, scale_of
 from aerotri.adjustment.solve import Solution, SolveOptions
