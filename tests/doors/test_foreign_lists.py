@@ -75,7 +75,12 @@ def test_yaw_pitch_roll_are_no_omega_phi_kappa(door, run):
 
 
 def test_proj_units_of_the_first_line(door, run):
-    door("odm_proj_header_ignored")
+    folder = door("odm_proj_header_ignored")
+    with pytest.raises(InputError, match="nothing says what the heights count in") as caught:
+        run(f"convert g9.txt --out g9 {CAMERA} --control-sigma-m 0.01")
+    assert "+vunits=m" in caught.value.remedy
+    text = (folder / "g9.txt").read_text()
+    (folder / "g9.txt").write_text(text.replace("+to_meter=0.3048", "+to_meter=0.3048 +vunits=m"))
     for name, plan, height in (("g9", 0.3048, 1.0), ("g10", 1.0, 1200.0 / 3937.0)):
         found = run(f"convert {name}.txt --out {name} {CAMERA} --control-sigma-m 0.01")
         assert "brought to metres" in found.output

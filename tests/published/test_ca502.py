@@ -27,9 +27,9 @@ def test_whole_block_converges_without_what_is_weak(tool, shared_data):
     """1265 photographs of five heads with their six control points; photograph D0627 has one ray. About a minute."""
     result = adjust(tool.oriented(tool.unoriented(shared_data("ca502"))))
     assert result.outcome.status == "converged"
-    # with and without the points that the whole block leaves loose, and again at the adjusted image points; how many
-    # depends on rounding
-    assert result.outcome.iterations <= 40
+    # with and without the points that the whole block leaves loose, and again at the adjusted image points; 38 seen,
+    # how many hangs on rounding
+    assert result.outcome.iterations <= 60
     assert len(result.control) == 6
     images, points = image_columns(result), point_columns(result)
     status = dict(zip(images["image"].tolist(), images["status"].tolist(), strict=True))

@@ -44,7 +44,8 @@ class StatedSystem:
     Parameters
     ----------
     crs : text as in `crs_text`, '' for local coordinates.
-    plan_to_metre, height_to_metre : factors of X and Y, and of the heights.
+    plan_to_metre, height_to_metre : factors of X and Y, and of the heights; NaN where X and Y count in feet, and
+        nothing says what the heights count in.
     note : what was understood, where that is not plain; '' otherwise.
     """
 
@@ -148,7 +149,7 @@ def _in_metres(system: CRS, text: str) -> StatedSystem:
         raise InputError(message, "transform them to a system with X, Y and heights, such as UTM")
     plan = 1.0 if parts[0].is_geographic else float(axes[0].unit_conversion_factor)
     heights = axes[2:] or (parts[1].axis_info if len(parts) > 1 else [])
-    height = float(heights[0].unit_conversion_factor) if heights else 1.0
+    height = float(heights[0].unit_conversion_factor) if heights else 1.0 if plan == 1.0 else float("nan")
     flat = parts[0].to_2d() if len(axes) == 3 and len(parts) == 1 else parts[0]
     found = crs_text(flat if plan == 1.0 else _metric(flat))
     if len(parts) > 1:
@@ -159,11 +160,9 @@ def _in_metres(system: CRS, text: str) -> StatedSystem:
     units = [
         f"{what} in {axis.unit_name}"
         for what, axis, factor in (("X and Y", axes[0], plan), ("heights", (heights or axes)[0], height))
-        if factor != 1.0
+        if factor != 1.0 and np.isfinite(factor)
     ]
     said = f"{' and '.join(units)}, brought to metres; the system is {system_in_words(found)}" if units else ""
-    if plan != 1.0 and not heights:
-        said += "; the unit of the heights is not stated, they are taken as metres"
     return StatedSystem(found, plan, height, said)
 
 

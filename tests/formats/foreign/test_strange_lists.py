@@ -32,13 +32,38 @@ def test_feet_of_local_coordinates(control):
         control("# CRS: local grid EPSG:2263\nname,X,Y,Z\nA,1,2,3\n")
 
 
-@pytest.mark.parametrize("line", ["# CoordinateSystem: EPSG:2263", "# EPSG:2263", "# Coordinate system EPSG:2263",
-                                  "# Horizontal CRS: EPSG:2263", "#EPSG,2263"])  # fmt: skip
+SYSTEM_LINES = (
+    "# CoordinateSystem: EPSG:2263", "# EPSG:2263", "# Coordinate system EPSG:2263", "# Horizontal CRS: EPSG:2263",
+    "#EPSG,2263",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("line", SYSTEM_LINES)
 @pytest.mark.parametrize("header", ["name,X,Y,Z\n", ""])
 def test_comments_that_name_a_system(control, line, header):
-    found = control(f"{line}\n{header}A,1000,2000,30\nB,1100,2100,30\n")
-    assert found.crs == "EPSG:32118"
-    np.testing.assert_allclose(found.xyz[0], [1000 * US_FOOT, 2000 * US_FOOT, 30], rtol=1e-9)
+    rows = "A,1000,2000,30\nB,1100,2100,30\n"
+    with pytest.raises(InputError, match="nothing says what the heights count in"):
+        control(f"{line}\n{header}{rows}")
+    found = control(f"{line}+6360\n{header}{rows}")
+    assert found.crs == "EPSG:32118+5703"
+    np.testing.assert_allclose(found.xyz[0], np.multiply([1000, 2000, 30], US_FOOT), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("ft", 0.3048)])
+def test_the_column_of_heights_says_what_it_counts_in(control, unit, factor):
+    found = control(f"# CRS: EPSG:2263\nname,X,Y,Z ({unit})\nA,1000,2000,30\n")
+    np.testing.assert_allclose(found.xyz, [[1000 * US_FOOT, 2000 * US_FOOT, 30 * factor]], rtol=1e-9)
+
+
+def test_titles_above_the_names_of_the_columns(control):
+    found = control("Survey of Monday\n\nname;X;Y;Z\nA;1;2,5;3\n")
+    assert found.xyz.tolist() == [[1, 2.5, 3]]
+    assert found.messages == ("list.csv: 'Survey of Monday' above the names of the columns is not used",)
+
+
+def test_five_numbers_are_no_app_of_ign(control):
+    with pytest.raises(InputError, match="not in a known format"):
+        control("1 691000 5331000 520 3\n2 691010 5331010 520 3\n")
 
 
 def test_comments_that_may_be_about_the_system_are_named(control):

@@ -43,7 +43,10 @@ def is_ign_mes(path: Path) -> bool:
 def is_ign_app(path: Path) -> bool:
     """Whether a file begins with a point, a code and three coordinates."""
     lines = [line.split() for line in first_lines(path, 2)]
-    return bool(lines) and all(len(line) == 5 and line[1].isdigit() and all_numbers(line[1:]) for line in lines)
+    # a code has three digits at most: longer ones are coordinates, of a list that is another one
+    return bool(lines) and all(
+        len(line) == 5 and line[1].isdigit() and len(line[1]) <= 3 and all_numbers(line[1:]) for line in lines
+    )
 
 
 def is_ign_camera(path: Path) -> bool:

@@ -16,6 +16,8 @@ from aerotri.formats.text.list_columns import ListColumn, is_unit, list_column, 
 from aerotri.formats.text.tables import LONGEST_NAME
 from aerotri.formats.text.text_lines import TextFile, all_numbers, first_lines
 
+TITLES = 9
+"""Rows of titles above the names of the columns at most [C]."""
 MOST_COLUMNS = 1000
 """Columns of a list at most; chosen [C]: no program writes as many; a file of another kind on one long line would."""
 NAME_ORDER = ("label", "name", "imagename", "image", "photo", "filename", "punkt", "point", "gcp", "marker", "target")
@@ -93,7 +95,12 @@ def header_of(lines: Sequence[str], columns: str = "") -> Header | None:
     if columns:
         first = lines[data] if data < len(lines) else ""
         return Header(stated_columns(columns), _separator(first), None)
-    for number in ([data] if data < len(lines) else []) + list(range(data - 1, -1, -1)):
+    # the first row, a comment above it, or a row below a title
+    for number in (
+        *range(data, min(data + 1, len(lines))),
+        *range(data - 1, -1, -1),
+        *range(data + 1, len(lines))[:TITLES],
+    ):
         line = lines[number].lstrip("# ")
         separator = _separator(line)
         found = tuple(map(list_column, cells(line, separator)[: MOST_COLUMNS + 1]))

@@ -6,10 +6,13 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from aerotri.conventions import InputError
 from aerotri.coordinates.stated_systems import REMEDY, StatedSystem, stated_system
 from aerotri.formats.text.text_lines import TextFile
 
+HEIGHTS_REMEDY = "name the system of the heights too (EPSG:2263+6360), add +vunits=m, or write Z (m) above their column"
 OF_SYSTEM = re.compile(
     r"#\s*(?:(?:coordinate|reference|horizontal|koordinaten)\s*(?:reference\s*)?system|(?:horizontal\s*)?crs|srs|projection)"
     r"(?:\s*\([^)]*\))?\s*[:=,]?\s+?(.+)|#\s*(EPSG[:,].+)",
@@ -74,6 +77,18 @@ def one_system(file: TextFile, stated: Sequence[tuple[int, str]]) -> StatedSyste
             )
         found = system
     return found
+
+
+def refuse_unknown_heights(file: TextFile, system: StatedSystem, heights: np.ndarray) -> None:
+    """Refuse heights (n,) whose unit nothing states, beside X and Y in feet.
+
+    Raises
+    ------
+    InputError
+    """
+    if np.isnan(system.height_to_metre) and np.isfinite(heights).any():
+        message = "X and Y count in feet, and nothing says what the heights count in"
+        raise file.error(0, message, HEIGHTS_REMEDY)
 
 
 def order_of_axes(exchanged: bool) -> list[int]:

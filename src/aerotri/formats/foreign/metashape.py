@@ -16,7 +16,7 @@ from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, texts
 from aerotri.formats.files.atomic import atomic_file
-from aerotri.formats.foreign.list_systems import system_above
+from aerotri.formats.foreign.list_systems import refuse_unknown_heights, system_above
 from aerotri.formats.text.text_lines import TextFile, first_lines
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 
@@ -65,6 +65,7 @@ def read_metashape(path: FilePath) -> OrientationList:
     values = file.table([words[row][1:7] for row in rows], rows, "value").reshape(-1, 6)
     rotation = rotation_from_angles(np.radians(values[:, 3:]))
     system, said = system_above(file.path)
+    refuse_unknown_heights(file, system, values[:, 2])
     _check_matrices(file, words, rows, rotation)
     return OrientationList(
         file.path,

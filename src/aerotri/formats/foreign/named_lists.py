@@ -20,7 +20,13 @@ from aerotri.coordinates.stated_systems import StatedSystem, geographic_of
 from aerotri.crs_text import plan_of
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, texts
 from aerotri.formats.foreign.list_header import Header, cells, check_header, header_of, rows_below
-from aerotri.formats.foreign.list_systems import in_words, one_system, order_of_axes, systems_of_comments
+from aerotri.formats.foreign.list_systems import (
+    in_words,
+    one_system,
+    order_of_axes,
+    refuse_unknown_heights,
+    systems_of_comments,
+)
 from aerotri.formats.text.list_columns import IN_DEGREES, ListColumn
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile
@@ -52,7 +58,10 @@ class _List:
             given = [(i, word) for i, word in enumerate(self.columns.get(name, ())) if word.lower() not in NO_NUMBER]
             index = [i for i, _ in given]
             values = self.file.values([word for _, word in given], [self.rows[i] for i in index], name)
-            found[index, k] = values * self._factor(name)
+            factor = self._factor(name)
+            if np.isnan(factor):
+                refuse_unknown_heights(self.file, self.system, values)
+            found[index, k] = values * factor
         return found
 
     def _factor(self, name: str) -> float:
@@ -95,7 +104,9 @@ def _read(path: Path, columns: str = "") -> _List:
         column.meaning: [words[row][i] for row in rows] for i, column in enumerate(header.columns) if column.meaning
     }
     system, notes = _system(everything, header, by_meaning)
-    return _List(everything, rows, by_meaning, header.columns, system, (*everything.notes, *notes))
+    above = [line for line in everything.lines[: header.line or 0] if not line.startswith("#")]
+    titles = tuple(f"{path.name}: '{line[:60]}' above the names of the columns is not used" for line in above)
+    return _List(everything, rows, by_meaning, header.columns, system, (*everything.notes, *titles, *notes))
 
 
 def _without_surplus(file: TextFile, row: int, header: Header) -> list[str]:

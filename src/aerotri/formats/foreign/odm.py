@@ -19,7 +19,7 @@ from aerotri.coordinates.stated_systems import StatedSystem, stated_system
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.parts import PointList, PositionList, RayList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
-from aerotri.formats.foreign.list_systems import in_words, order_of_axes
+from aerotri.formats.foreign.list_systems import in_words, order_of_axes, refuse_unknown_heights
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, check_words, first_lines, is_number
 from aerotri.observations import Block
@@ -124,6 +124,7 @@ def read_odm_gcp(path: FilePath, exchanged: bool = False) -> PointList:
     place: dict[str, int] = {}
     image = np.array([image_place.setdefault(name, len(image_place)) for name in images], dtype=np.int64)
     point = np.array([place.setdefault(name, len(place)) for name in names], dtype=np.int64)
+    refuse_unknown_heights(file, system, values[:, 2])
     xyz = _places(file, rows, names, point, values[:, :3])[:, order_of_axes(exchanged)] * system.to_metre
     file.refuse_repeated([f"{p}' in photograph '{i}" for p, i in zip(names, images, strict=True)], rows, "point")
     return PointList(
@@ -215,6 +216,7 @@ def read_odm_geo(path: FilePath, exchanged: bool = False) -> PositionList:
     if np.isnan(values[:, :2]).any():
         bad = int(np.flatnonzero(np.isnan(values[:, :2]).any(axis=1))[0])
         raise file.error(rows[bad], "the plan position is missing", f"rows are: {form}")
+    refuse_unknown_heights(file, system, values[:, 2])
     accuracy = values[:, 6:8]
     bad = np.flatnonzero((accuracy < SMALLEST_POSITIVE).any(axis=1))
     if len(bad):

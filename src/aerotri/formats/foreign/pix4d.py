@@ -19,7 +19,7 @@ from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.foreign.list_header import is_named
-from aerotri.formats.foreign.list_systems import order_of_axes, system_above
+from aerotri.formats.foreign.list_systems import order_of_axes, refuse_unknown_heights, system_above
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, check_words, first_lines
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
@@ -141,6 +141,7 @@ def read_pix4d_geo(path: FilePath, axes: str = "xy") -> PositionList:
 def _placed(file: TextFile, values: np.ndarray, axes: str) -> tuple[np.ndarray, str, tuple[str, ...]]:
     """(n, 3) m in the order X, Y, Z, the system that a comment names, and what to say of it."""
     system, said = system_above(file.path)
+    refuse_unknown_heights(file, system, values[:, 2])
     return _ordered(values, axes) * system.to_metre, system.crs, said
 
 
