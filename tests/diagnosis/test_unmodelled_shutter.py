@@ -96,3 +96,19 @@ def test_film_has_none():
     block = drone(2)
     marks = {"1": (-6.0, 0.0), "2": (6.0, 0.0)}
     assert found_in(replace(block, cameras=tuple(replace(one, fiducials=marks) for one in block.cameras))) is None
+
+
+@pytest.mark.parametrize("datum", ["minimal", "inner"])
+def test_gross_errors_of_the_points_that_hold_the_datum(datum):
+    """These keep their rays: without them the test would have no datum."""
+    block = drone(2)
+    block = replace(block, gnss_ins=replace(block.gnss_ins, sigma=np.full((len(block.gnss_ins), 3), np.nan)))
+    adjustment = replace(block.settings.adjustment, datum=datum, datum_fixed=())
+    block = replace(block, settings=replace(block.settings, adjustment=adjustment))
+    unknowns = adjust_keeping_system(block).system.unknowns
+    held = unknowns.points[unknowns.point_held.any(axis=1)]
+    wrong = np.isin(block.image_points.point, held)
+    xy = block.image_points.xy.copy()
+    xy[wrong] += np.random.default_rng(1).normal(0.0, 0.03, (wrong.sum(), 2))
+    found = found_in(replace(block, image_points=replace(block.image_points, xy=xy)))
+    assert found is not None

@@ -195,12 +195,16 @@ def _step(system: NormalSystem, solution: Solution, block: Block) -> _Step | Non
 
 
 def _without_gross(system: NormalSystem, solution: Solution) -> np.ndarray:
-    """(m,) bool of the rays that are no gross errors, of points that two or more of these see."""
+    """(m,) bool of the rays that are no gross errors, of points that two or more of these see.
+
+    A point that would lose its place and holds the datum keeps all its rays.
+    """
     u = system.unknowns
     length = normalised_lengths(solution.equations.residual, u.rays.inv_sigma)
     keep = length <= GROSS * scale_of(length, 1.0)
     point = np.repeat(np.arange(len(u.points)), np.diff(u.rays.start))
-    return keep & (np.bincount(point[keep], minlength=len(u.points))[point] > 1)
+    seen = np.bincount(point[keep], minlength=len(u.points)) > 1
+    return (keep & seen[point]) | (~seen & u.point_held.any(axis=1))[point]
 
 
 def _with_strip_velocities(system: NormalSystem, state: State) -> NormalSystem:
