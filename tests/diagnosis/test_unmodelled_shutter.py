@@ -102,7 +102,8 @@ def test_film_has_none():
 def test_gross_errors_of_the_points_that_hold_the_datum(datum):
     """These keep their rays: without them the test would have no datum."""
     block = drone(2)
-    block = replace(block, gnss_ins=replace(block.gnss_ins, sigma=np.full((len(block.gnss_ins), 3), np.nan)))
+    nothing = np.full((len(block.gnss_ins), 3), np.nan)
+    block = replace(block, gnss_ins=replace(block.gnss_ins, xyz=nothing, sigma=nothing))
     adjustment = replace(block.settings.adjustment, datum=datum, datum_fixed=())
     block = replace(block, settings=replace(block.settings, adjustment=adjustment))
     unknowns = adjust_keeping_system(block).system.unknowns
