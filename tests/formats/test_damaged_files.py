@@ -16,6 +16,7 @@ from aerotri.formats.assembly.kinds import CONTROL, ORIENTATIONS, POSITIONS, RAY
 from aerotri.formats.block.folder import read_block
 from aerotri.formats.block.settings import read_cameras_toml
 from aerotri.formats.foreign.bingo import is_bingo, read_bingo
+from aerotri.formats.foreign.blocks_exchange import read_blocks_exchange
 from aerotri.formats.foreign.bundler import is_bundler, read_bundler
 from aerotri.formats.foreign.ign import read_ign_app, read_ign_camera, read_ign_mes, read_ign_opk
 from aerotri.formats.foreign.metashape import read_metashape
@@ -27,6 +28,7 @@ from aerotri.formats.foreign.patb import read_patb_con, read_patb_im, read_patb_
 from aerotri.formats.foreign.pix4d import read_pix4d_eo, read_pix4d_gcp, read_pix4d_geo, read_pix4d_offset
 from formats.assembly.test_project import CAMERAS_TOML
 from formats.block.test_block_extras import CONSTRAINTS, EDITS, MARKS, PIXELS
+from formats.foreign.blocks_exchange_sample import BlocksExchange
 from formats.foreign.test_bingo import SMALL as BINGO
 from formats.foreign.test_bundler import BUNDLE
 from formats.foreign.test_ign import APP, CAMERA, MES, OPK
@@ -38,6 +40,7 @@ from formats.foreign.test_point_lists import GCP, GEO, NATIVE, ODM_GCP, ODM_GEO,
 QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
 READERS = {
     "bingo": (read_bingo, BINGO),
+    "blocks exchange": (read_blocks_exchange, BlocksExchange("local").text()),
     "bundler": (read_bundler, BUNDLE),
     "cameras.toml": (read_cameras_toml, CAMERAS_TOML),
     "ign app": (read_ign_app, APP),

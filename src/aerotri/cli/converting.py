@@ -54,9 +54,9 @@ def convert(
     source: Annotated[
         str,
         typer.Argument(
-            help="Block, result, DBAT, BAL, COLMAP, Bundler, OpenSfM, Metashape (.psx, .psz, cameras XML), a folder of "
-            "IGN or PAT-B files, image points (BINGO, .im, .mes, gcp_list.txt) or a list of orientations; PATH or "
-            "kind:PATH.",
+            help="Block, result, DBAT, BAL, COLMAP, Bundler, OpenSfM, Metashape (.psx, .psz, cameras XML), "
+            "BlocksExchange XML, a folder of IGN or PAT-B files, image points (BINGO, .im, .mes, gcp_list.txt) or a "
+            "list of orientations; PATH or kind:PATH.",
             rich_help_panel=ARGUMENTS,
         ),
     ],
@@ -66,7 +66,8 @@ def convert(
         str,
         typer.Option(
             help="block, bal, colmap, colmap-text, bundler, opensfm, metashape (opk), metashape-camera, metashape-xml, "
-            "pix4d-eo, ign, patb, bingo, pix4d-gcp, pix4d-geo, pix4d-offset, odm-gcp, odm-geo, ign-mes, ign-app.",
+            "blocks-exchange, pix4d-eo, ign, patb, bingo, pix4d-gcp, pix4d-geo, pix4d-offset, odm-gcp, odm-geo, "
+            "ign-mes, ign-app.",
             rich_help_panel=OUTPUT,
         ),
     ] = "block",

@@ -19,6 +19,8 @@ from aerotri.formats.block.folder import read_block, write_block
 from aerotri.formats.foreign import bundler, colmap, opensfm, patb
 from aerotri.formats.foreign.bal import is_bal, read_bal, write_bal
 from aerotri.formats.foreign.bingo import write_bingo
+from aerotri.formats.foreign.blocks_exchange import is_blocks_exchange, read_blocks_exchange
+from aerotri.formats.foreign.blocks_exchange_writer import write_blocks_exchange
 from aerotri.formats.foreign.bundler import is_bundler, read_bundler, write_bundler
 from aerotri.formats.foreign.colmap import read_colmap, write_colmap
 from aerotri.formats.foreign.colmap_in_place import update_colmap
@@ -52,6 +54,7 @@ RECOGNISERS: Mapping[str, Callable[[Path], bool]] = {
     "bundler": is_bundler,
     "opensfm": is_opensfm,
     "metashape-project": is_metashape_project,
+    "blocks-exchange": is_blocks_exchange,
 }
 
 
@@ -67,6 +70,7 @@ READERS: Mapping[str, Callable[[Path], tuple[Block, np.ndarray | None]]] = {
     "bundler": lambda path: _block_and_points(read_bundler(path)),
     "opensfm": lambda path: _block_and_points(read_opensfm(path)),
     "metashape-project": lambda path: _block_and_points(read_metashape_project(path)),
+    "blocks-exchange": lambda path: _block_and_points(read_blocks_exchange(path)),
 }
 OrientedWriter = Callable[[OrientedBlock, Path], tuple[str, ...]]
 WRITERS: Mapping[str, OrientedWriter] = {
@@ -81,6 +85,7 @@ ORIENTATION_WRITERS: Mapping[str, OrientedWriter] = {
     "metashape": write_metashape,
     "metashape-camera": write_metashape_camera,
     "metashape-xml": write_metashape_cameras,
+    "blocks-exchange": write_blocks_exchange,
     "opk": write_metashape,
     "pix4d-eo": write_pix4d_eo,
     "ign": write_ign_opk,

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 Tables = Literal["csv", "parquet"]
 Target = Literal[
     "block", "bal", "colmap", "colmap-text", "bundler", "opensfm", "metashape", "metashape-camera", "metashape-xml",
-    "opk", "pix4d-eo", "ign", "patb", "bingo", "pix4d-gcp", "pix4d-geo", "pix4d-offset", "odm-gcp", "odm-geo",
-    "ign-mes", "ign-app",
+    "blocks-exchange", "opk", "pix4d-eo", "ign", "patb", "bingo", "pix4d-gcp", "pix4d-geo", "pix4d-offset", "odm-gcp",
+    "odm-geo", "ign-mes", "ign-app",
 ]  # fmt: skip
 
 

@@ -99,6 +99,12 @@ def _projects(written: dict[str, dict[str, bytes]]) -> list[Target]:
             return read_project(Request(f"metashape-project:{folder / source}", "x"))
 
         targets.append(Target(f"metashape project {ending}", files, tuple(files), read_site))
+    for kind, name, content in seeds.whole_files():
+
+        def read_file(folder: Path, kind: str = kind, name: str = name) -> object:
+            return read_project(Request(f"{kind}:{folder / name}", "x"))
+
+        targets.append(Target(kind, {name: content}, (name,), read_file))
     dbat = seeds.of_tests("test_dbat").FILES
     files = {f"x/{name}": text.encode() for name, text in dbat.items()}
     read_dbat = lambda folder: read_project(Request(f"dbat:{folder / 'x'}", "x"))  # noqa: E731

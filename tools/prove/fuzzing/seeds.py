@@ -84,6 +84,12 @@ def metashape_project(ending: str) -> dict[str, bytes]:
         return contents(Path(folder))
 
 
+def whole_files() -> list[tuple[str, str, bytes]]:
+    """Format, file name and content of blocks that are one file."""
+    bentley = of_tests("blocks_exchange_sample").BlocksExchange
+    return [("blocks-exchange", "site.xml", bentley(kind).text().encode()) for kind in ("local", "enu")]
+
+
 def contents(folder: Path) -> dict[str, bytes]:
     """The files below a folder by their paths in it."""
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}

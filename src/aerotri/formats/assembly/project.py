@@ -32,6 +32,7 @@ from aerotri.formats.assembly.parts import (
 from aerotri.formats.assembly.reprojection import FEWEST, control_at_start, residuals_at_start, sample_of_points
 from aerotri.formats.assembly.rigs_by_name import names_told, with_rig
 from aerotri.formats.block.folder import read_block
+from aerotri.formats.foreign.blocks_exchange import read_blocks_exchange
 from aerotri.formats.foreign.bundler import read_bundler
 from aerotri.formats.foreign.colmap import read_colmap
 from aerotri.formats.foreign.ign import files_of, is_ign, is_ign_camera, read_ign_app, read_ign_camera, read_ign_mes
@@ -45,7 +46,7 @@ FOLDERS = {"ign": "IGN", "patb": "PAT-B"}
 """Kinds of folders whose files are parts."""
 UNKNOWN_PIXEL_UM = 1.0
 """Size of a pixel where nothing tells it; a principal distance of 3000 pixels then reads 3 mm."""
-MAY_FREE = ("bundler", "colmap", "metashape-project", "opensfm")
+MAY_FREE = ("blocks-exchange", "bundler", "colmap", "metashape-project", "opensfm")
 """Whole blocks whose interior elements --free-interior makes unknowns."""
 SHIFTS = ("off", "block", "strip")
 
@@ -229,6 +230,8 @@ def _as_it_is(request: Request, sources: Sources) -> Reading | None:
         raise InputError("has cameras of its own", "leave --camera-size out", path)
     if kind == "metashape-project":
         return read_metashape_project(path, pixel_um)
+    if kind == "blocks-exchange":
+        return read_blocks_exchange(path, pixel_um, request.stated.geoid)
     said = () if pixel_um is not None else (f"a pixel counts as {UNKNOWN_PIXEL_UM:g} µm: state it with --pixel-um",)
     if kind in ("bundler", "opensfm", "colmap"):
         pixel_um = UNKNOWN_PIXEL_UM if pixel_um is None else pixel_um

@@ -128,6 +128,20 @@ def fitted_camera(
     return replace(camera, lens=fitted, brown={}, parameters={}), (said,)
 
 
+def expressible_camera(
+    camera: Camera, names: Sequence[str], errors: np.ndarray | None, program: str
+) -> tuple[Camera, tuple[str, ...]]:
+    """The camera as it is where a program has words for all that it does, else the nearest, and what was fitted.
+
+    Parameters
+    ----------
+    names, errors : see `nearest_of_all`. program : its name.
+    """
+    used = {name for name, prior in camera.lens.items() if prior.value}
+    bent = any(prior.value for prior in camera.brown.values()) or (errors is not None and bool(errors.any()))
+    return (camera, ()) if used <= set(names) and not bent else fitted_camera(camera, names, errors, program)
+
+
 def _nearest(camera: Camera, ideal: np.ndarray, bent: np.ndarray, names: Sequence[str]) -> FittedLens:
     there = np.isfinite(ideal).all(axis=1)
     focal_px = camera.focal_length_mm / camera.pixel_mm

@@ -16,7 +16,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.files.atomic import atomic_file
-from aerotri.formats.foreign.lens_fit import fitted_camera
+from aerotri.formats.foreign.lens_fit import expressible_camera
 from aerotri.formats.text.tables import LARGEST_FORMAT_PX, SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import first_lines
 from aerotri.formats.text.xml_text import child_text, numbers, read_xml
@@ -121,11 +121,7 @@ def expressible(camera: Camera, errors: np.ndarray | None = None) -> tuple[Camer
     ----------
     errors : of further additional parameters, see `lens_fit.nearest_of_all`.
     """
-    named = {name for name, prior in camera.lens.items() if prior.value}
-    bent = any(prior.value for prior in camera.brown.values()) or (errors is not None and bool(errors.any()))
-    if named <= set(OUR_LENS) and not bent:
-        return camera, ()
-    return fitted_camera(camera, OUR_LENS, errors, "Metashape")
+    return expressible_camera(camera, OUR_LENS, errors, "Metashape")
 
 
 def calibration_of(camera: Camera) -> dict[str, float]:

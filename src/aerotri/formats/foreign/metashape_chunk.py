@@ -19,6 +19,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.formats.foreign.metashape_camera import NOT_EXPRESSED, PROJECTIONS, RADIAL
 from aerotri.formats.foreign.metashape_files import REMEDY
+from aerotri.formats.foreign.reconstruction import rotation_matrix
 from aerotri.formats.text.tables import (
     CONTROL_CHARACTERS,
     LARGEST_FORMAT_PX,
@@ -34,8 +35,6 @@ TRUE = ("true", "1", "yes")
 ACCURACIES = {"tiepoints": 1.0, "projections": 0.1, "markers": 0.005, "cameras": 10.0}
 """Settings and their values in a new project: pixels, pixels, m, m."""
 AUTHORITY = re.compile(r'AUTHORITY\["EPSG","(\d{1,6})"\]\]\s*$')
-OFF_ROTATION = 1e-3
-"""Deviation from a rotation that is taken for rounding [C]."""
 
 
 def number(text: str | None, what: str, path: Path) -> float:
@@ -207,12 +206,7 @@ def rotation_of(values: np.ndarray, what: str, path: Path) -> np.ndarray:
     InputError
         When they are none.
     """
-    given = values.reshape(3, 3)
-    u, size, vt = np.linalg.svd(given)
-    rotation = u @ vt
-    if np.abs(size - 1.0).max() > OFF_ROTATION or np.linalg.det(rotation) < 0.0:
-        raise InputError(f"{what[:80]} is no rotation", REMEDY, path)
-    return rotation
+    return rotation_matrix(values, InputError(f"{what[:80]} is no rotation", REMEDY, path))
 
 
 Transform = tuple[np.ndarray, np.ndarray, float]

@@ -21,7 +21,6 @@ from aerotri.coordinates.local_frame import topocentric_frame
 from aerotri.crs_text import plan_of
 from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.parts import Reading, no_sigma, texts
-from aerotri.formats.foreign.colmap_model import is_free
 from aerotri.formats.foreign.colmap_rigs import COLMAP_FROM_CAMERA
 from aerotri.formats.foreign.metashape_chunk import (
     Sensor,
@@ -38,6 +37,7 @@ from aerotri.formats.foreign.metashape_chunk import (
     transform_of,
 )
 from aerotri.formats.foreign.metashape_files import REMEDY, Project, open_project, read_ply
+from aerotri.formats.foreign.reconstruction import unknown_lens, with_same_lens
 from aerotri.formats.text.tables import LARGEST_FORMAT_PX, LARGEST_NUMBER
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import (
@@ -49,11 +49,9 @@ from aerotri.observations import (
     ImagePoints,
     Images,
     Mounting,
-    Prior,
     Rig,
     Settings,
 )
-from aerotri.observations.block import LENS_NAMES
 from aerotri.observations.rigs import STATION
 
 LARGEST_ID = 1 << 40
@@ -137,7 +135,7 @@ def read_metashape_project(path: FilePath, pixel_um: float | None = None) -> Rea
         start = np.where(meeting[:, None], start, np.nan)
     block = Block(
         name=path.stem,
-        cameras=_complete(cameras),
+        cameras=with_same_lens(cameras),
         images=Images(
             texts(list(photographs.names.values())),
             photographs.sensor,
@@ -150,7 +148,7 @@ def read_metashape_project(path: FilePath, pixel_um: float | None = None) -> Rea
         image_points=_image_points(rays, cameras, photographs.sensor),
         rigs=rigs,
         settings=Settings(
-            AdjustmentSettings(additional_parameters=_free(cameras), datum="minimal"),
+            AdjustmentSettings(additional_parameters=unknown_lens(cameras), datum="minimal"),
             image_sigma_um=accuracy["tiepoints"] * cameras[0].pixel_um,
         ),
     )
@@ -173,18 +171,6 @@ def _photographs(chunk: Element, pixel_um: float | None, path: Path) -> _Photogr
     place = {key: i for i, key in enumerate(sensors)}
     sensor = np.array([place[node.get("sensor_id", "")] for node in elements], dtype=np.int64)
     return _Photographs(elements, names, {key: row for row, key in enumerate(names)}, sensors, sensor)
-
-
-def _complete(cameras: tuple[Camera, ...]) -> tuple[Camera, ...]:
-    """A parameter that other cameras estimate is held at zero where a camera does not have it."""
-    used = [name for name in LENS_NAMES if any(name in camera.lens for camera in cameras)]
-    held = Prior(0.0, fixed=True)
-    return tuple(replace(camera, lens={name: camera.lens.get(name, held) for name in used}) for camera in cameras)
-
-
-def _free(cameras: tuple[Camera, ...]) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    items = tuple(name for name in LENS_NAMES if any(is_free(camera.lens.get(name)) for camera in cameras))
-    return (("lens", items),) if items else ()
 
 
 def _image_points(rays: _Rays, cameras: tuple[Camera, ...], of_image: np.ndarray) -> ImagePoints:
