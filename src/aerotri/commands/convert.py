@@ -90,7 +90,7 @@ def run_convert(
     InputError
     """
     from aerotri.public.blocks import read_request
-    from aerotri.public.converting import convert, name_of_target, refuse_no_project, refuse_target
+    from aerotri.public.converting import convert, imported_as_written, name_of_target, refuse_no_project, refuse_target
 
     if in_place:
         refuse_no_project(request.source, target, to)
@@ -100,6 +100,10 @@ def run_convert(
     geoid, tell = request.stated.geoid, Console().stage
     said = convert(found, target, to, geoid=geoid, in_place=in_place, overwrite=overwrite, progress=tell)
     messages = [*found.messages, *said]
+    if to == "block" and not as_json and found.sources:
+        record = imported_as_written(found)
+        print("\n".join([*record.remarks, *record.lines(), f"Written to {target}"]))
+        return
     if as_json:
         print(json_text({"target": str(target), "format": to, "messages": messages}, None))
         return

@@ -99,7 +99,7 @@ class _Told:
     def _tiepoints(self, tied: Any, folder: Path) -> None:
         from aerotri.commands.tiepoints import outcome_lines
 
-        self._print(outcome_lines(tied.summary(folder), folder))
+        self._print(outcome_lines(tied.summary(folder), folder, tied.imported))
 
     def _adjust(self, found: Adjustment, folder: Path) -> None:
         from aerotri.commands.adjust import outcome_lines

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from aerotri.commands.console import Console
 from aerotri.execution.choice import THREADS, chosen
@@ -13,6 +13,9 @@ from aerotri.formats.assembly.assemble import Statements
 from aerotri.formats.assembly.camera_spec import CameraSpec
 from aerotri.formats.results.json_text import json_text
 from aerotri.tie_points.settings import DEFAULTS
+
+if TYPE_CHECKING:
+    from aerotri.formats.assembly.imported import ImportRecord
 
 HEADING = "control point"
 MOST_LINES = 40
@@ -70,17 +73,18 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
     if as_json:
         print(json_text(content, None))
     else:
-        console.lines(outcome_lines(content, out))
+        console.lines(outcome_lines(content, out, tied.imported))
     if tied.misplaced:
         console.failure(tied.misplaced)
     return 1 if tied.misplaced else 0
 
 
-def outcome_lines(content: dict[str, Any], out: Path) -> list[str]:
-    """What the user reads of the block and of the page to mark control points in."""
+def outcome_lines(content: dict[str, Any], out: Path, imported: ImportRecord) -> list[str]:
+    """What the user reads of the block, of its import, and of the page to mark control points in."""
     pairs, per = content["pairs"], content["points_per_photograph"]
     said = [
-        *content["messages"],
+        *imported.remarks,
+        *imported.lines(),
         *placement_lines(content["placement"]),
         f"{content['photographs']} photographs in {content['crs']}, {pairs['tied']} of {pairs['compared']} pairs tied: "
         f"{content['tie_points']} tie points with {content['rays_per_point']:.1f} rays, "

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+HEIGHTS_NOT_NAMED = "system not named; taken as above the ellipsoid"
+"""Of a block: its frame on the ground takes heights of no system for ellipsoidal ones."""
+
 
 @dataclass(frozen=True)
 class CrsNames:
@@ -42,3 +45,14 @@ def crs_names(crs: str) -> CrsNames:
         plan, heights = whole.sub_crs_list[:2]
         return CrsNames(plan.name, code, heights.name)
     return CrsNames(whole.name, code, "")
+
+
+def heights_in_words(crs: str) -> str:
+    """What the heights of a block count from: the one wording of it, on the screen, in files and on pages.
+
+    Parameters
+    ----------
+    crs : see `crs_names`. '' of local coordinates and of a system that is not known.
+    """
+    names = crs_names(crs)
+    return (names.vertical or HEIGHTS_NOT_NAMED) if names.name else ""

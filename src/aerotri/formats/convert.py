@@ -39,6 +39,7 @@ from aerotri.formats.foreign.opensfm import is_opensfm, read_opensfm, write_open
 from aerotri.formats.foreign.opensfm_in_place import origin_of, update_opensfm
 from aerotri.formats.foreign.patb import write_patb
 from aerotri.formats.foreign.pix4d import write_pix4d_eo, write_pix4d_gcp, write_pix4d_geo
+from aerotri.formats.text.notes import left_behind
 from aerotri.observations import Block
 
 
@@ -176,7 +177,7 @@ def write_any(block: Block, path: FilePath, format: str = "block", points: np.nd
     """
     if format == "block":
         write_block(block, path)
-        return () if points is None else ("could not be carried over: start values of object points",)
+        return about_points(points)
     if format in BLOCK_WRITERS:
         return BLOCK_WRITERS[format](block, Path(path))
     if format not in TARGETS:
@@ -186,6 +187,11 @@ def write_any(block: Block, path: FilePath, format: str = "block", points: np.nd
             raise InputError(f"a {format} model needs object points", "adjust the block and export the result", path)
         points = np.full((len(block.points), 3), np.nan)
     return write_oriented(oriented_block(block, points), path, format)
+
+
+def about_points(points: np.ndarray | None) -> tuple[str, ...]:
+    """A block folder has no place for start values of object points (N, 3)."""
+    return () if points is None else (left_behind("could not be carried over: start values of object points"),)
 
 
 def write_oriented(

@@ -15,6 +15,7 @@ from aerotri.observations import Block
 if TYPE_CHECKING:
     import numpy as np
 
+    from aerotri.formats.assembly.imported import ImportRecord, ImportSource
     from aerotri.formats.assembly.project import Request
 
 Sigmas = tuple[float, float, float]
@@ -77,6 +78,7 @@ class ReadBlock:
     messages : what was matched, assumed or left out, in sentences.
     source : what was read, as it was stated.
     is_result : whether that is the folder of a result; its block is the one that was adjusted.
+    sources : files and folders that were read, with their formats.
     """
 
     block: Block
@@ -84,6 +86,14 @@ class ReadBlock:
     messages: tuple[str, ...]
     source: str = ""
     is_result: bool = False
+    sources: tuple[ImportSource, ...] = ()
+
+    @property
+    def imported(self) -> ImportRecord:
+        """What was taken, what was assumed, and what was left behind: the content of import.json."""
+        from aerotri.formats.assembly.imported import ImportRecord
+
+        return ImportRecord(self.block, self.sources, self.messages)
 
     def __repr__(self) -> str:
         block = self.block
@@ -308,11 +318,13 @@ def read_request(request: Request) -> ReadBlock:
     ------
     InputError
     """
+    from aerotri.formats.assembly.imported import sources_of
     from aerotri.formats.assembly.project import read_project
 
     if not (Path(request.source) / "solution.npz").is_file():
         reading = read_project(request)
-        return ReadBlock(reading.block, reading.points, tuple(reading.messages), request.source)
+        messages, sources = tuple(reading.messages), sources_of(request)
+        return ReadBlock(reading.block, reading.points, messages, request.source, sources=sources)
     if request != type(request)(request.source, request.name, stated=request.stated):
         raise InputError(
             "is the result of an adjustment, to which nothing can be added",

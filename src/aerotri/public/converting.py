@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -15,6 +16,7 @@ from aerotri.public.folders import refuse_existing_file, refuse_foreign_entries
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 
 if TYPE_CHECKING:
+    from aerotri.formats.assembly.imported import ImportRecord
     from aerotri.formats.assembly.oriented import OrientedBlock
 
 Tables = Literal["csv", "parquet"]
@@ -82,8 +84,9 @@ def convert(
         said = source.messages
     if isinstance(source, Block):
         source = ReadBlock(source, points, ())
-    if to == "block" and tables != "csv":
-        return (*said, *_write_tables(source.block, target, tables))
+    if to == "block":
+        own = ReadBlock(source.block, None, (), is_result=True) if isinstance(source, Adjustment) else source
+        return (*said, *_write_own(own, target, tables))
     with stage_report(progress) as report:
         if in_place:
             return (*said, *_update(source, target, to, geoid))
@@ -92,14 +95,34 @@ def convert(
         return (*said, *_write_block(source, target, to, geoid, report))
 
 
-def _write_tables(block: Block, target: Path, tables: Tables) -> tuple[str, ...]:
-    """The block in our own format with its tables as asked for."""
-    from aerotri.formats.block.writer import write_block
+def _write_own(source: ReadBlock, target: Path, tables: Tables) -> tuple[str, ...]:
+    """The block in our own format, with its tables as asked for, and import.json beside it where it was read."""
+    from aerotri.formats.block.writer import IMPORT, OWN_ENTRIES, write_block
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.formats.results.json_text import write_json
 
     if tables not in get_args(Tables):
         raise InputError(f"there are no tables as '{tables}'", f"choose {' or '.join(get_args(Tables))}")
-    write_block(block, target, tables)
-    return _about_held(block)
+    said = losses_of_import(source)
+    if not source.sources:
+        write_block(source.block, target, tables)
+        return said
+    with atomic_folder(target, own=OWN_ENTRIES) as place:
+        write_block(source.block, place, tables)
+        write_json(place / IMPORT, imported_as_written(source).as_dict())
+    return said
+
+
+def losses_of_import(source: ReadBlock) -> tuple[str, ...]:
+    """What a block folder cannot hold of what was read, and what is to be known of it."""
+    from aerotri.formats.convert import about_points
+
+    return (*(() if source.is_result else _about_held(source.block)), *about_points(source.points))
+
+
+def imported_as_written(source: ReadBlock) -> ImportRecord:
+    """What was imported into a block folder."""
+    return replace(source, messages=(*source.messages, *losses_of_import(source))).imported
 
 
 def name_of_target(target: Path, to: Target) -> str:
@@ -173,7 +196,7 @@ def _write_result(source: Adjustment | ReadBlock, target: Path, to: Target, geoi
     from aerotri.formats.convert import BLOCK_WRITERS, write_any, write_oriented
     from aerotri.opening import open_result
 
-    if to == "block" or to in BLOCK_WRITERS:
+    if to in BLOCK_WRITERS:
         return tuple(write_any(source.block, target, to))
     adjusted = source.adjusted if isinstance(source, Adjustment) else open_result(source.source).result
     return tuple(write_oriented(oriented_from_adjusted(adjusted), target, to, geoid))
@@ -186,7 +209,7 @@ def _write_block(
     from aerotri.formats.convert import BLOCK_WRITERS, ORIENTATION_WRITERS, write_any, write_oriented
 
     block, points, said = reading.block, reading.points, _about_held(reading.block)
-    if to == "block" or to in BLOCK_WRITERS:
+    if to in BLOCK_WRITERS:
         return (*said, *write_any(block, target, to, points))
     if to in ORIENTATION_WRITERS:
         oriented, at_start = _at_start_values(block, points, to)

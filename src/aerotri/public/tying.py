@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from aerotri.execution.work import Workplace
     from aerotri.formats.assembly.camera_spec import CameraSpec
+    from aerotri.formats.assembly.imported import ImportRecord, ImportSource
     from aerotri.observations import Block
     from aerotri.tie_points.given import Given
     from aerotri.tie_points.photographs import PhotographSet
@@ -43,6 +44,7 @@ class TiedPhotographs:
     ----------
     record : the block and how it was found. photographs : their files and cameras. given : what was read beside them.
     seconds : that it took. settings : every argument that was used, as tiepoints.json has them.
+    sources : files and folders that were read, with their formats.
     """
 
     record: TiedBlock
@@ -50,6 +52,7 @@ class TiedPhotographs:
     given: Given
     seconds: float
     settings: list[dict[str, Any]] = field(default_factory=list)
+    sources: tuple[ImportSource, ...] = ()
 
     @property
     def block(self) -> Block:
@@ -88,6 +91,13 @@ class TiedPhotographs:
         """What was matched, assumed or left out, in sentences."""
         return self.record.messages
 
+    @property
+    def imported(self) -> ImportRecord:
+        """What was taken, what was assumed, and what was left behind: the content of import.json."""
+        from aerotri.formats.assembly.imported import ImportRecord
+
+        return ImportRecord(self.block, self.sources, self.messages)
+
     def summary(self, folder: FilePath | None = None) -> dict[str, Any]:
         """The content of tiepoints.json.
 
@@ -121,7 +131,7 @@ class TiedPhotographs:
         InputError
             When the folder holds files of others, or cannot be written to.
         """
-        from aerotri.formats.block.writer import OWN_ENTRIES, write_block
+        from aerotri.formats.block.writer import IMPORT, OWN_ENTRIES, write_block
         from aerotri.formats.files.atomic import atomic_folder
         from aerotri.formats.files.work_place import held
         from aerotri.formats.results.json_text import write_json
@@ -136,6 +146,7 @@ class TiedPhotographs:
             if given.control is not None:
                 report.stage("control points in the photographs", None)
                 write_control_marks(self.record, given.control, self.photographs, given.stated.geoid, place / MARKS)
+            write_json(place / IMPORT, self.imported.as_dict())
             write_json(place / RECORD, self.summary(target))
         return target
 
@@ -293,13 +304,14 @@ def _tied(
     from aerotri.compiled import compilation_notice
     from aerotri.tie_points.photographs import find_photographs
     from aerotri.tie_points.photographs_to_block import tie_photographs
-    from aerotri.tie_points.stated import read_given, stated_camera
+    from aerotri.tie_points.stated import read_given, sources_of_photographs, stated_camera
 
     photographs = find_photographs(folder, stated_camera(camera))
     given = read_given(files, mark_sigma_px)
     report.stage(compilation_notice() or "features of photographs", None)
     tied = tie_photographs(photographs, given, options, cache, report.counted, at)
-    return TiedPhotographs(tied, photographs, given, time.perf_counter() - begun)
+    sources = sources_of_photographs(photographs, folder, files, camera.file)
+    return TiedPhotographs(tied, photographs, given, time.perf_counter() - begun, sources=sources)
 
 
 def refuse_other_content(folder: Path, overwrite: bool) -> None:

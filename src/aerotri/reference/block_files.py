@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from aerotri.reference.adjust_tables import PLACE as RESULT
+from aerotri.reference.block_tables import PLACE as BLOCK_FOLDER
 from aerotri.reference.head import ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.records import DescribedFile, Item, of_axes
 
@@ -166,6 +167,32 @@ TIEPOINTS_JSON = (
     Item("marking_page", "text", "Page to mark control points in; empty without control."),
     *ARGUMENTS,
 )
+IMPORT_JSON = (
+    *HEAD,
+    BLOCK,
+    Item("sources[]", "object", "Files and folders that were read."),
+    Item("sources[].path", "text", "As it was written on the command line."),
+    Item(
+        "sources[].holds", "text", "What was taken from it: block, photographs, image points, control points and so on."
+    ),
+    Item("sources[].format", "text", "Its format, as it was recognised; empty of a camera."),
+    Item("sources[].program", "text", "Program that writes the format, or the cameras of photographs; empty of lists."),
+    Item("taken", "object", "What was taken."),
+    Item("taken.photographs", "whole", "Number of photographs."),
+    Item("taken.cameras", "whole", "Number of cameras."),
+    Item("taken.image_points", "whole", "Number of image points."),
+    Item("taken.points", "whole", "Number of points with image points."),
+    Item("taken.control_points", "whole", "Number of control points."),
+    Item("taken.check_points", "whole", "Number of check points."),
+    Item("taken.gnss_positions", "whole", "Number of photographs with an observed position."),
+    Item("taken.ins_attitudes", "whole", "Number of photographs with an observed attitude."),
+    Item("taken.start_orientations", "whole", "Number of photographs with a start orientation."),
+    Item("taken.heights", "text", "What the heights count from; empty of local coordinates."),
+    Item("taken.notes[]", "text", "What was used in another way than it stands in the files, such as feet."),
+    Item("assumed[]", "text", "What no file and no option said: defaults, the order of columns, standard deviations."),
+    Item("left_behind[]", "text", "What stands in the files and not in the block."),
+    Item("remarks[]", "text", "What else is to be known: how well things fit, what looks wrong."),
+)
 PREDICTED = (
     POINT,
     NAME,
@@ -215,6 +242,14 @@ def block_files() -> tuple[DescribedFile, ...]:
         ),
         DescribedFile(
             "PHOTOGRAPH.tif", PHOTOGRAPHS, "raster", "The rendered photographs, 16 bit.", when="with --render"
+        ),
+        DescribedFile(
+            "import.json",
+            BLOCK_FOLDER,
+            "json",
+            "What was taken, assumed and left behind when the block was read from other files.",
+            IMPORT_JSON,
+            "of convert, tiepoints and run",
         ),
         DescribedFile("tiepoints.json", TIEPOINTS, "json", "How well the photographs are tied.", TIEPOINTS_JSON),
         DescribedFile(

@@ -12,6 +12,7 @@ from aerotri.formats.assembly import assemble, placing
 from aerotri.formats.assembly.assemble_control import with_check_points, with_control
 from aerotri.formats.assembly.names_match import match_photographs
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, Reading, no_sigma
+from aerotri.formats.text.notes import assumed, left_behind
 from aerotri.observations import Block
 from aerotri.tie_points.photographs import PhotographSet
 from aerotri.tie_points.settings import DEFAULTS
@@ -77,24 +78,25 @@ def positions_in(photographs: PhotographSet, given: Given, crs: str) -> tuple[Po
     if crs == "local":
         control = given.control
         why = "the block has none" if control is None else f"{control.path.name} names none and is not in UTM"
-        return None, (f"positions of EXIF were left out for want of a coordinate system: {why}; state it with --crs",)
+        about = f"positions of EXIF were left out for want of a coordinate system: {why}; state it with --crs"
+        return None, (left_behind(about),)
     xyz = photographs.lon_lat_height[known]
     flat = placing.to_crs(xyz, "EPSG:4326", plan_of(crs), None)
     said = []
     first = given.control or given.orientation
     if first is not None and not getattr(first, "crs", "") and not given.stated.crs:
-        said.append(
-            f"{first.path.name} names no coordinate system: {crs}, in which it lies where the photographs were taken, "
-            "is taken; state another with --crs"
-        )
+        about = f"{crs}, in which it lies where the photographs were taken, is taken; state another with --crs"
+        said.append(assumed(f"{first.path.name} names no coordinate system: {about}"))
     if "+" in crs and photographs.ellipsoidal[known].all():
         flat = placing.from_ellipsoidal_heights(flat, crs, given.stated.geoid)
     elif not photographs.ellipsoidal[known].any():
-        said.append("heights of EXIF count from sea level; they are taken as those of the block's CRS as they are")
+        about = "heights of EXIF count from sea level; they are taken as those of the block's CRS as they are"
+        said.append(assumed(about))
     stated = given.stated.positions_sigma_m
     sigma = photographs.sigma_m[known]
     if stated is None and np.isnan(sigma).any():
-        said.append("positions of EXIF do not say how good they are: σ {:g}, {:g}, {:g} m taken".format(*EXIF_SIGMA_M))
+        about = "positions of EXIF do not say how good they are: σ {:g}, {:g}, {:g} m taken".format(*EXIF_SIGMA_M)
+        said.append(assumed(about))
     sigma = np.where(np.isnan(sigma), np.array(stated or EXIF_SIGMA_M), sigma)
     path = photographs.paths[0].parent
     return PositionList(path, photographs.names[known], flat, sigma, no_sigma(len(known))), tuple(said)
@@ -125,9 +127,8 @@ def complete(reading: Reading, given: Given, crs: str, positions: PositionList |
         reading = with_control(reading, control, given.stated)
         reading = with_check_points(reading, given.check)
     elif control is not None:
-        reading = replace(
-            reading, messages=(*reading.messages, f"{control.path.name}: its points are not marked yet, so not in use")
-        )
+        about = left_behind(f"{control.path.name}: its points are not marked yet, so not in use")
+        reading = replace(reading, messages=(*reading.messages, about))
     return _with_datum(reading)
 
 

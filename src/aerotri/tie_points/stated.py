@@ -7,13 +7,22 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly import kinds
 from aerotri.formats.assembly.assemble import Statements
 from aerotri.formats.assembly.camera_spec import CameraSpec, cameras_of
+from aerotri.formats.assembly.imported import (
+    CAMERA,
+    CONTROL,
+    ORIENTATIONS,
+    PHOTOGRAPHS,
+    POSITIONS,
+    ImportSource,
+    source_of_list,
+)
 from aerotri.formats.assembly.parts import PointList
 from aerotri.tie_points.given import Given
-from aerotri.tie_points.photographs import StatedCamera
+from aerotri.tie_points.photographs import PhotographSet, StatedCamera
 
 
 @dataclass(frozen=True)
@@ -78,6 +87,32 @@ def read_given(files: GivenFiles, mark_sigma_px: float) -> Given:
         orientation=kinds.read_orientations(files.orientation, reading) if files.orientation else None,
         mark_sigma_px=mark_sigma_px,
     )
+
+
+def sources_of_photographs(
+    photographs: PhotographSet, folder: FilePath, files: GivenFiles, camera: FilePath | None
+) -> tuple[ImportSource, ...]:
+    """The folder of photographs and the files beside it, as they were read.
+
+    Raises
+    ------
+    InputError
+        When a file is no longer there.
+    """
+    reading = kinds.options_of(files.stated)
+    of_positions = reading.beside_control() if files.control else reading
+    models = ", ".join(one.name for one in photographs.cameras) if camera is None else ""
+    found = [ImportSource(str(folder), PHOTOGRAPHS, "EXIF and XMP", models)]
+    for text, known, holds, how in (
+        (files.control, kinds.CONTROL, CONTROL, reading),
+        (files.positions, kinds.POSITIONS, POSITIONS, of_positions),
+        (files.orientation, kinds.ORIENTATIONS, ORIENTATIONS, reading),
+    ):
+        if text:
+            found.append(source_of_list(text, known, holds, how))
+    if camera is not None:
+        found.append(ImportSource(str(camera), CAMERA))
+    return tuple(found)
 
 
 def _in_block(name: str, control: PointList | None, prefix: str) -> str:

@@ -16,6 +16,7 @@ from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.names_match import match_photographs
 from aerotri.formats.assembly.parts import OrientationList, PositionList, RayList, Reading, no_sigma
 from aerotri.formats.assembly.reprojection import settle
+from aerotri.formats.text.notes import assumed, left_behind, taken
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.observations import Block, Camera, GnssIns, ImagePoints, Images
 from aerotri.observations.names import in_words
@@ -127,16 +128,13 @@ def with_rays(reading: Reading, rays: RayList, sigma_px: float = 1.0) -> Reading
 def _about_names(file: str, names: np.ndarray, index: np.ndarray, loosely: int, known: np.ndarray) -> list[str]:
     said = []
     if loosely:
-        said.append(
-            f"{file}: {counted(loosely, 'photograph is', 'photographs are')} named with another folder or file ending"
-        )
+        loose = counted(loosely, "photograph is", "photographs are")
+        said.append(assumed(f"{file}: {loose} named with another folder or file ending"))
     missing = np.flatnonzero(index < 0)
     if len(missing):
         others = in_words(names[missing].astype(str).tolist(), _not_met(known, index))
-        said.append(
-            f"{file}: {counted(len(missing), 'photograph is', 'photographs are')} not in the block and left out: "
-            f"{others}"
-        )
+        many = counted(len(missing), "photograph is", "photographs are")
+        said.append(left_behind(f"{file}: {many} not in the block and left out: {others}"))
     return said
 
 
@@ -264,12 +262,12 @@ def _settled(
         placed[name][own] = rotations[rows]
     try:
         name, said = settle(block, centre, placed, "state it: --patb-rotation camera-to-object or object-to-camera")
-        return readings[name], f"{given.path.name}: {said}"
+        return readings[name], taken(f"{given.path.name}: {said}")
     except InputError as error:
         if not given.first_unless:
             raise InputError(error.message, error.remedy, given.path) from error
         name = given.choices[0][0]
-        return readings[name], f"{given.path.name}: angles are taken as {name}; image points do not tell"
+        return readings[name], assumed(f"{given.path.name}: angles are taken as {name}; image points do not tell")
 
 
 def with_positions(reading: Reading, given: PositionList, stated: Statements) -> Reading:
@@ -299,7 +297,7 @@ def with_positions(reading: Reading, given: PositionList, stated: Statements) ->
         xyz = placing.near_in_crs(xyz, given.crs, block.crs, stated.geoid, near, given.path)
     elif given.heights and "+" in block.crs:
         xyz = placing.from_ellipsoidal_heights(xyz, block.crs, stated.geoid)
-        messages.append(f"{given.path.name}: ellipsoidal heights were brought to those of {block.crs}")
+        messages.append(taken(f"{given.path.name}: ellipsoidal heights were brought to those of {block.crs}"))
     placing.refuse_heights(given.images[rows], xyz[:, 2], block.crs, placing.HIGHEST_FLIGHT_M, given.path)
     placing.refuse_far_off(block.control.xyz, xyz, given.path)
     placing.refuse_far_off(xyz, block.images.centre, given.path, may_be_free=True)
@@ -347,7 +345,7 @@ def _with_attitudes(
         return block.images, ()
     if block.crs == "local":
         said = "yaw, pitch, roll count from true north and were left out: a local system does not know it; state --crs"
-        return block.images, (said,)
+        return block.images, (left_behind(said),)
     own = image[there]
     rotation, convergence = placing.rotation_from_yaw_pitch_roll(angles[there], xyz[there], block.crs)
     centre, start = block.images.centre.copy(), block.images.angles.copy()
@@ -355,4 +353,4 @@ def _with_attitudes(
     centre[own] = np.where(np.isnan(centre[own]), xyz[there], centre[own])
     turned = float(np.degrees(np.median(convergence)))
     said = f"yaw, pitch, roll of {len(own)} photographs are start values, turned by {turned:+.3f}° to grid north"
-    return replace(block.images, centre=centre, angles=start), (said,)
+    return replace(block.images, centre=centre, angles=start), (taken(said),)

@@ -11,6 +11,7 @@ from aerotri.conventions import InputError, counted
 from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.assemble import Statements, given_or_stated, padded, refuse_local
 from aerotri.formats.assembly.parts import PointList, Reading, no_sigma
+from aerotri.formats.text.notes import taken
 from aerotri.observations import Block, Control
 from aerotri.observations.names import in_words, prefix_of, quoted, under_prefix
 
@@ -91,7 +92,7 @@ def _in_block(
         return placing.near_in_crs(given.xyz, given.crs, block.crs, stated.geoid, flown, given.path), []
     if "ellipsoidal" in (stated.control_heights, given.heights) and "+" in block.crs:
         xyz = placing.from_ellipsoidal_heights(given.xyz, block.crs, stated.geoid)
-        return xyz, [f"{given.path.name}: ellipsoidal heights were brought to those of {block.crs}"]
+        return xyz, [taken(f"{given.path.name}: ellipsoidal heights were brought to those of {block.crs}")]
     if stated.control_heights == "ellipsoidal":
         raise InputError(
             f"--control-heights ellipsoidal is not needed: all heights of {block.crs} are ellipsoidal",

@@ -12,6 +12,7 @@ from aerotri.formats.foreign.bingo import format_in_name
 from aerotri.formats.foreign.ign import is_ign_camera, read_ign_camera
 from aerotri.formats.foreign.metashape_camera import is_metashape_camera, read_metashape_camera
 from aerotri.formats.foreign.orientation_list import is_ortho_camera, read_ortho_camera
+from aerotri.formats.text.notes import assumed, left_behind
 from aerotri.observations import Camera, Prior
 
 SAME_FORMAT = 0.01
@@ -142,7 +143,7 @@ def camera_of_each(cameras: tuple[Camera, ...], named: list[str]) -> tuple[tuple
     distinct = sorted({name for name in named if name})
     if len(cameras) == 1:
         said = f"the photographs name the cameras {', '.join(distinct)}; all are taken as '{cameras[0].name}'"
-        return cameras, np.zeros(len(named), np.int64), [said] if len(distinct) > 1 else []
+        return cameras, np.zeros(len(named), np.int64), [assumed(said)] if len(distinct) > 1 else []
     place = {camera.name: i for i, camera in enumerate(cameras)}
     for name in named:
         if name not in place:
@@ -153,5 +154,5 @@ def camera_of_each(cameras: tuple[Camera, ...], named: list[str]) -> tuple[tuple
     used = sorted({place[name] for name in named})
     index = np.searchsorted(used, [place[name] for name in named])
     left = [camera.name for i, camera in enumerate(cameras) if i not in used]
-    said = [f"camera '{name}' has no photographs and was left out" for name in left]
-    return tuple(cameras[i] for i in used), index, said
+    lost: list[str] = [left_behind(f"camera '{name}' has no photographs and was left out") for name in left]
+    return tuple(cameras[i] for i in used), index, lost

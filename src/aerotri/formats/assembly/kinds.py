@@ -122,9 +122,20 @@ def kind_of(path: Path, kinds: Kinds) -> str | None:
     return next((name for name, (recognises, _) in kinds.items() if recognises(path)), None)
 
 
-def _read(text: str, kinds: Kinds, what: str, options: ReadingOptions) -> Any:
+def stated_or_told(text: str, kinds: Kinds, options: ReadingOptions) -> tuple[str | None, Path]:
+    """The kind that ``PATH`` or ``kind:PATH`` is read as, None where it is none of these, and the path.
+
+    Raises
+    ------
+    InputError
+        When there is no such file.
+    """
     stated, path = split_kind(text, kinds)
-    kind = stated or ("csv" if options.columns and "csv" in kinds else kind_of(path, kinds))
+    return stated or ("csv" if options.columns and "csv" in kinds else kind_of(path, kinds)), path
+
+
+def _read(text: str, kinds: Kinds, what: str, options: ReadingOptions) -> Any:
+    kind, path = stated_or_told(text, kinds, options)
     if kinds is ORIENTATIONS and kind != "pix4d-eo" and options.offset is not None:
         raise InputError("is not an orientation of Pix4D; --offset is only for these", "leave --offset out", path)
     if kind is None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from aerotri.conventions import counted
+from aerotri.formats.text.notes import left_behind
 from aerotri.observations import Block
 
 Count = Callable[[Block], int]
@@ -73,7 +74,7 @@ def losses(block: Block, *held: str) -> tuple[str, ...]:
     for name, (count, words) in THINGS.items():
         number = 0 if name in held else count(block)
         if number > 0:
-            said.append(f"could not be carried over: {_with_number(words, number)}")
+            said.append(left_behind(f"could not be carried over: {_with_number(words, number)}"))
     return tuple(said)
 
 

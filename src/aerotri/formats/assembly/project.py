@@ -6,9 +6,11 @@ points, or a list of orientations (photographs alone). What else is given is add
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -40,6 +42,7 @@ from aerotri.formats.foreign.list_header import has_attitudes
 from aerotri.formats.foreign.metashape_project import read_metashape_project
 from aerotri.formats.foreign.opensfm import read_opensfm
 from aerotri.formats.foreign.pix4d import read_pix4d_offset
+from aerotri.formats.text.notes import assumed
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images
 
 FOLDERS = {"ign": "IGN", "patb": "PAT-B"}
@@ -49,6 +52,7 @@ UNKNOWN_PIXEL_UM = 1.0
 MAY_FREE = ("blocks-exchange", "bundler", "colmap", "metashape-project", "opensfm")
 """Whole blocks whose interior elements --free-interior makes unknowns."""
 SHIFTS = ("off", "block", "strip")
+_Read = TypeVar("_Read")
 
 
 @dataclass(frozen=True)
@@ -232,12 +236,12 @@ def _as_it_is(request: Request, sources: Sources) -> Reading | None:
         return read_metashape_project(path, pixel_um)
     if kind == "blocks-exchange":
         return read_blocks_exchange(path, pixel_um, request.stated.geoid)
-    said = () if pixel_um is not None else (f"a pixel counts as {UNKNOWN_PIXEL_UM:g} µm: state it with --pixel-um",)
+    said = () if pixel_um is not None else (_about_pixel(UNKNOWN_PIXEL_UM),)
     if kind in ("bundler", "opensfm", "colmap"):
         pixel_um = UNKNOWN_PIXEL_UM if pixel_um is None else pixel_um
         if kind == "colmap":
-            block, points = sources.colmap(path, pixel_um)
-            return Reading(block, points, said)
+            (block, points), heard = _with_warnings(lambda pixel=pixel_um: sources.colmap(path, pixel))
+            return Reading(block, points, (*heard, *said))
         read = read_bundler(path, pixel_um, size_px) if kind == "bundler" else read_opensfm(path, pixel_um)
         return replace(read, messages=(*read.messages, *said))
     if pixel_um is not None:
@@ -246,6 +250,22 @@ def _as_it_is(request: Request, sources: Sources) -> Reading | None:
         return Reading(read_block(path, rays_needed=False))
     block, points = convert.read_any(path, kind)
     return Reading(block, points)
+
+
+def _with_warnings(read: Callable[[], _Read]) -> tuple[_Read, tuple[str, ...]]:
+    """What is read, and what its reader warns of."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = read()
+    own = [one.message.args[0] for one in caught if type(one.message) is UserWarning]
+    for one in caught:
+        if type(one.message) is not UserWarning:
+            warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
+    return found, tuple(own)
+
+
+def _about_pixel(pixel_um: float) -> str:
+    return assumed(f"a pixel counts as {pixel_um:g} µm: state it with --pixel-um")
 
 
 def _parts(request: Request, options: ReadingOptions, sources: Sources) -> _Parts:
@@ -284,7 +304,7 @@ def _ign(folder: Path, request: Request) -> _Parts:
         raise InputError("two files in this folder describe the same camera", "keep one of them", folder)
     rays = tuple(read_ign_mes(path) for path in files_of(folder, ".mes"))
     control = tuple(read_ign_app(path) for path in files_of(folder, ".app"))
-    said = f"a pixel counts as {pixel_um:g} µm: state it with --pixel-um"
+    said = _about_pixel(pixel_um)
     told = request.camera.pixel_um is not None or request.camera.describes_camera
     list_of = kinds.read_orientations(f"ign-opk:{orientations}", ReadingOptions())
     return _Parts(rays, list_of, control, cameras, () if told else (said,))
@@ -355,9 +375,8 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
         raise InputError("--image-sigma-um and --image-sigma-px exclude each other", "state one of the two")
     if sigma_um is None and (sigma_px is not None or is_new):
         if sigma_px is None and len(rays):
-            messages.append(
-                "the standard deviation of image points is assumed as 1 pixel: state yours with --image-sigma-px"
-            )
+            about = "the standard deviation of image points is assumed as 1 pixel: state yours with --image-sigma-px"
+            messages.append(assumed(about))
         sigma_px = 1.0 if sigma_px is None else sigma_px
         sigma_um = sigma_px * block.cameras[0].pixel_um
         sigma = sigma_in_px(block, rays.image, sigma_px)
@@ -375,10 +394,8 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
             raise InputError(f"--gnss-shift '{request.gnss_shift}' is not possible", f"give {' or '.join(SHIFTS)}")
         settings = replace(settings, gnss=replace(settings.gnss, shift=request.gnss_shift))
     elif request.positions and settings.gnss.shift != "off":
-        messages.append(
-            f"the block estimates a shift of the GNSS positions (gnss.shift = {settings.gnss.shift}): "
-            "--gnss-shift off leaves it out"
-        )
+        about = f"the block estimates a shift of the GNSS positions (gnss.shift = {settings.gnss.shift})"
+        messages.append(assumed(f"{about}: --gnss-shift off leaves it out"))
     block = replace(block, settings=settings, image_points=replace(rays, sigma=sigma))
     messages += [*suspicions_of_lists(block), *fit_of_start_values(block, request.stated.geoid)]
     return replace(reading, block=block, messages=tuple(messages))

@@ -28,6 +28,7 @@ from aerotri.formats.convert import READERS
 from aerotri.formats.foreign.colmap_pieces import open_colmap
 from aerotri.formats.foreign.ign import files_of
 from aerotri.formats.foreign.section_pieces import open_bingo, open_patb_im
+from aerotri.formats.text.notes import left_behind
 from aerotri.observations import Block, ImagePoints
 
 IN_PIECES = "COLMAP, PAT-B (.im) and BINGO"
@@ -143,7 +144,7 @@ def read_in_pieces(request: Request, room: Path) -> ProjectInPieces:
     )  # fmt: skip
     sigma_px = 1.0 if request.image_sigma_px is None else request.image_sigma_px
     held = _held(block, room)
-    lost = ("could not be carried over: start values of object points",) if kind == "colmap" else ()
+    lost = (left_behind("could not be carried over: start values of object points"),) if kind == "colmap" else ()
     return ProjectInPieces(held.block, (*reading.messages, *lost), bulk, more, request.image_sigma_um, sigma_px)
 
 

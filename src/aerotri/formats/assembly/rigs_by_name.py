@@ -14,6 +14,7 @@ import numpy as np
 from aerotri.adjustment.rigging import robust_mean
 from aerotri.conventions import InputError, counted
 from aerotri.formats.assembly.parts import Reading
+from aerotri.formats.text.notes import taken
 from aerotri.functional_model.rotation import angles_from_rotation, logarithm, rotation_from_angles
 from aerotri.observations import Block, Camera, Mounting, Prior, Rig
 from aerotri.observations.names import ENDING, stem
@@ -104,8 +105,8 @@ def with_rig(reading: Reading, pattern: str, reference: str = "") -> Reading:
         raise InputError(fault.message, f"let {OPTION} tell them apart, with a folder as {{station}}/… if need be")
     block = replace(block, images=images, rigs=(rig,))
     rig, said = _with_mountings(block, rig)
-    messages = [f"rig '{NAME}': {counted(len(led), 'station')}, cameras {', '.join(own.values())}, reference camera "
-                f"'{rig.reference}'", *said]  # fmt: skip
+    about = f"rig '{NAME}': {counted(len(led), 'station')}, cameras {', '.join(own.values())}, reference camera "
+    messages = [taken(f"{about}'{rig.reference}'"), *said]
     if alone.any():
         many = counted(int(alone.sum()), "photograph stands", "photographs stand")
         messages.append(f"{many} alone: no photograph of the reference camera at the same station")

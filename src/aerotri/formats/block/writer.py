@@ -20,7 +20,9 @@ from aerotri.observations.settings import GnssSettings, PhotographFieldSettings
 
 ANGLE_UNIT = "deg"
 TABLE_NAMES = ("images", "image_points", "control", "gnss_ins", "fiducials", "edits", "constraints")
-OWN_ENTRIES = ("block.toml", *(f"{name}.{ending}" for name in TABLE_NAMES for ending in ("csv", "parquet")))
+IMPORT = "import.json"
+"""What was taken, assumed and left behind when the block was read from files of other programs."""
+OWN_ENTRIES = ("block.toml", IMPORT, *(f"{name}.{ending}" for name in TABLE_NAMES for ending in ("csv", "parquet")))
 DECIMALS = {
     **dict.fromkeys(("X", "Y", "Z", "X0", "Y0", "Z0", "time"), 6),
     **dict.fromkeys(("x", "y"), 7),

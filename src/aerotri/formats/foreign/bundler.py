@@ -18,6 +18,7 @@ from aerotri.formats.assembly.parts import Reading, texts
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.foreign.bal import FARTHEST_PX, SMALLEST_FOCAL_PX, WRITTEN_LENS
 from aerotri.formats.text.csv_text import read_bytes
+from aerotri.formats.text.notes import assumed, left_behind
 from aerotri.formats.text.tables import LARGEST_NUMBER
 from aerotri.formats.text.text_lines import TextFile, check_words, first_lines, is_number, line_of_word
 from aerotri.functional_model.rotation import angles_from_rotation
@@ -151,10 +152,12 @@ def read_bundler(path: FilePath, pixel_um: float = 1.0, size_px: tuple[int, int]
     names, messages = _names(path, len(content.cameras))
     oriented = content.cameras[:, 0] > 0.0
     if not oriented.all():
-        messages.append(f"left out: {counted(int((~oriented).sum()), 'photograph')} that Bundler did not orient")
+        about = f"left out: {counted(int((~oriented).sum()), 'photograph')} that Bundler did not orient"
+        messages.append(left_behind(about))
     keep, repeated = _once_each(content, oriented)
     if repeated:
-        messages.append(f"left out: {counted(repeated, 'repeated measurement')} of a point in the same photograph")
+        about = f"left out: {counted(repeated, 'repeated measurement')} of a point in the same photograph"
+        messages.append(left_behind(about))
     if not len(keep):
         raise InputError("holds no image points of oriented photographs", "give a reconstruction with points", path)
     number = np.cumsum(oriented) - 1
@@ -189,7 +192,8 @@ def _names(path: Path, count: int) -> tuple[list[str], list[str]]:
     """Names of the photographs: of list.txt, else numbers from 0 as the file itself counts; and messages."""
     place = next((folder / LIST for folder in (path.parent, path.parent.parent) if (folder / LIST).is_file()), None)
     if place is None:
-        return [str(i) for i in range(count)], [f"there is no {LIST}: photographs are called by their numbers from 0"]
+        about = f"there is no {LIST}: photographs are called by their numbers from 0"
+        return [str(i) for i in range(count)], [assumed(about)]
     file = TextFile(place)
     if len(file) != count:
         message = f"names {len(file)} photographs, {path.name} has {count}"

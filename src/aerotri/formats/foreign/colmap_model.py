@@ -19,6 +19,7 @@ from aerotri.formats.foreign.colmap_arrays import FILES, write_bare
 from aerotri.formats.foreign.colmap_binary import check_binary_model
 from aerotri.formats.foreign.colmap_cameras import MOST_PIXELS, read_camera
 from aerotri.formats.foreign.colmap_rigs import COLMAP_FROM_CAMERA, rigs_of_model, stations_of_model
+from aerotri.formats.text.notes import assumed, left_behind
 from aerotri.formats.text.tables import CONTROL_CHARACTERS, LARGEST_NUMBER, LONGEST_NAME
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Prior, Settings
@@ -123,7 +124,7 @@ def _cameras_of(model: Any, pixel_um: float, folder: Path) -> tuple[tuple[Camera
     ids = sorted(model.cameras)
     read = [read_camera(model.cameras[number], pixel_um, folder) for number in ids]
     for sentence in dict.fromkeys(sentence for _, said in read for sentence in said):
-        warnings.warn(sentence, stacklevel=3)
+        warnings.warn(UserWarning(assumed(sentence)), stacklevel=3)
     found = [camera for camera, _ in read]
     used = [name for name in LENS_NAMES if any(name in camera.lens for camera in found)]
     complete = []
@@ -241,4 +242,5 @@ def refuse_far(xyz: np.ndarray, folder: Path) -> None:
 
 def warn_of_repeated(count: int) -> None:
     """Warn of measurements that are left out."""
-    warnings.warn(f"left out: {counted(count, 'repeated measurement')} of a point in the same image", stacklevel=4)
+    about = left_behind(f"left out: {counted(count, 'repeated measurement')} of a point in the same image")
+    warnings.warn(UserWarning(about), stacklevel=4)

@@ -18,6 +18,7 @@ from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, RayList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
+from aerotri.formats.text.notes import left_behind
 from aerotri.formats.text.tables import LARGEST_FORMAT_PX, SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, check_words, first_lines
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
@@ -133,7 +134,9 @@ def read_ign_mes(path: FilePath) -> RayList:
         xy=px[measured],
         unit="px",
         focal_length_mm=np.full(len(images), np.nan),
-        messages=(f"{file.path.name}: {counted(left, 'row')} of 0 0 left out: not measured",) if left else (),
+        messages=(left_behind(f"{file.path.name}: {counted(left, 'row')} of 0 0 left out: not measured"),)
+        if left
+        else (),
     )
 
 
@@ -156,7 +159,8 @@ def read_ign_app(path: FilePath) -> PointList:
     file.refuse_repeated(names, rows, "point")
     xyz = file.table([line[2:] for line in words], rows, "coordinate").reshape(-1, 3)
     codes = ", ".join(sorted({line[1][:9] for line in words}))
-    said = f"the codes of the points ({codes}) are not interpreted: all are control unless named with --check"
+    about = f"the codes of the points ({codes}) are not interpreted: all are control unless named with --check"
+    said = left_behind(about)
     return PointList(file.path, texts(names), xyz, no_sigma(len(xyz)), np.zeros(len(xyz), bool), messages=(said,))
 
 

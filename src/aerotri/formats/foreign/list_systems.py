@@ -10,6 +10,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.coordinates.stated_systems import REMEDY, StatedSystem, stated_system
+from aerotri.formats.text.notes import left_behind, taken
 from aerotri.formats.text.text_lines import TextFile
 
 HEIGHTS_REMEDY = "name the system of the heights too (EPSG:2263+6360), add +vunits=m, or write Z (m) above their column"
@@ -38,7 +39,7 @@ def system_above(path: Path) -> tuple[StatedSystem, tuple[str, ...]]:
 
 def in_words(system: StatedSystem, path: Path) -> tuple[str, ...]:
     """What to say of how the system of a list was understood; nothing where that is plain."""
-    return (f"{path.name}: {system.note}",) if system.note else ()
+    return (taken(f"{path.name}: {system.note}"),) if system.note else ()
 
 
 def systems_of_comments(file: TextFile, header_line: int | None) -> tuple[list[tuple[int, str]], tuple[str, ...]]:
@@ -51,7 +52,7 @@ def systems_of_comments(file: TextFile, header_line: int | None) -> tuple[list[t
         if found is not None:
             stated.append((row, found[1] or found[2].replace(",", ":")))
         elif ABOUT_SYSTEM.search(line):
-            notes.append(f"{file.path.name}:{file.numbers[row]}: '{line[:60]}' is not used")
+            notes.append(left_behind(f"{file.path.name}:{file.numbers[row]}: '{line[:60]}' is not used"))
     return stated, tuple(notes)
 
 

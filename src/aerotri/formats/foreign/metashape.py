@@ -17,6 +17,7 @@ from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, texts
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.foreign.list_systems import refuse_unknown_heights, system_above
+from aerotri.formats.text.notes import left_behind
 from aerotri.formats.text.text_lines import TextFile, first_lines
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 
@@ -67,13 +68,14 @@ def read_metashape(path: FilePath) -> OrientationList:
     system, said = system_above(file.path)
     refuse_unknown_heights(file, system, values[:, 2])
     _check_matrices(file, words, rows, rotation)
+    without = left_behind(f"{counted(left, 'photograph')} without orientation left out")
     return OrientationList(
         file.path,
         texts(names),
         np.full(len(names), ""),
         values[:, :3] * system.to_metre,
         rotation,
-        messages=(*said, *((f"{counted(left, 'photograph')} without orientation left out",) if left else ())),
+        messages=(*said, *([without] if left else [])),
         crs=system.crs,
     )
 

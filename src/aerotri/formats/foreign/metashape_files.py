@@ -21,6 +21,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.text.csv_text import read_bytes
+from aerotri.formats.text.notes import left_behind
 from aerotri.formats.text.text_lines import first_lines
 from aerotri.formats.text.xml_text import read_xml, xml_of
 
@@ -105,7 +106,7 @@ def _of_document(root: Element, path: Path, member: Callable[[str], bytes]) -> P
 
 def _others(count: int, chunk: Element) -> tuple[str, ...]:
     said = f"of {count} chunks '{chunk.get('label', '')[:60]}' is read, the active one: activate another in Metashape"
-    return (said,) if count > 1 else ()
+    return (left_behind(said),) if count > 1 else ()
 
 
 def _cloud_of(frame: Element) -> Element | None:

@@ -38,6 +38,7 @@ from aerotri.formats.foreign.metashape_chunk import (
 )
 from aerotri.formats.foreign.metashape_files import REMEDY, Project, open_project, read_ply
 from aerotri.formats.foreign.reconstruction import unknown_lens, with_same_lens
+from aerotri.formats.text.notes import left_behind, taken
 from aerotri.formats.text.tables import LARGEST_FORMAT_PX, LARGEST_NUMBER
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import (
@@ -156,7 +157,8 @@ def read_metashape_project(path: FilePath, pixel_um: float | None = None) -> Rea
     control = Control(np.arange(len(labels)), xyz, sigma, is_check)
     reading = _with_reference(moved, control, _positions(photographs, accuracy["cameras"], path), crs)
     rolling = any(node.find("rolling_shutter") is not None for node in photographs.elements)
-    said = ("rolling shutter corrections are not carried over: state [camera.NAME.rolling_shutter]",) * rolling
+    about = "rolling shutter corrections are not carried over: state [camera.NAME.rolling_shutter]"
+    said = (left_behind(about),) * rolling
     return replace(
         reading, messages=(*project.messages, *reading.messages, *of_parts, *about_marks, *about_ties, *said)
     )
@@ -221,8 +223,10 @@ def _poses(photographs: _Photographs, chunk: Element, path: Path) -> tuple[np.nd
                 continue
             r, t, s = between
             centre[row], rotation[row] = t + s * r @ matrix[:3, 3], r @ turn @ COLMAP_FROM_CAMERA
-    said = [
-        f"{counted(n, 'photograph')} of component '{part[:60]}' without orientation: its axes are tied to no others"
+    said: list[str] = [
+        left_behind(
+            f"{counted(n, 'photograph')} of component '{part[:60]}' without orientation: its axes are tied to no others"
+        )
         for part, n in left.items()
     ]
     return centre, rotation, said
@@ -266,8 +270,8 @@ def _markers(
         np.array(px, float).reshape(-1, 2),
         np.full(len(image), accuracy["projections"]),
     )
-    said = [f"left out: {counted(left, 'image point')} of markers, not pinned or of photographs switched off"]
-    return list(names.values()), xyz, sigma, is_check, rays, said if left else []
+    about = f"left out: {counted(left, 'image point')} of markers, not pinned or of photographs switched off"
+    return list(names.values()), xyz, sigma, is_check, rays, [left_behind(about)] if left else []
 
 
 def _tie_points(
@@ -313,8 +317,8 @@ def _tie_points(
         raise InputError("an image point lies outside of any photograph", REMEDY, path)
     used, point = np.unique(point, return_inverse=True)
     rays = _Rays(image.astype(np.int64), point.ravel() + first, px, np.full(len(image), sigma_px))
-    said = [f"left out: {counted(left, 'image point')} of tie points without place, or twice in a photograph"]
-    return ids[used].astype(str).tolist(), xyz[used], rays, said if left else []
+    about = f"left out: {counted(left, 'image point')} of tie points without place, or twice in a photograph"
+    return ids[used].astype(str).tolist(), xyz[used], rays, [left_behind(about)] if left else []
 
 
 def _moved(reading: Reading, chunk: Element, crs: str, path: Path) -> Reading:
@@ -375,7 +379,7 @@ def _with_reference(
             if at is None:
                 return replace(reading, messages=(*messages, "nothing says where the chunk lies"))
             target = utm_on_datum(plan_of(crs), float(at[0]), float(at[1]))
-            messages.append(f"coordinates in degrees ({crs}) were brought to {target}, heights are ellipsoidal")
+            messages.append(taken(f"coordinates in degrees ({crs}) were brought to {target}, heights are ellipsoidal"))
         if reading.origin is not None:
             reading = placing.in_crs(reading, target)
         else:

@@ -28,6 +28,7 @@ from aerotri.formats.foreign.list_systems import (
     systems_of_comments,
 )
 from aerotri.formats.text.list_columns import IN_DEGREES, ListColumn
+from aerotri.formats.text.notes import assumed, left_behind, taken
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -105,7 +106,7 @@ def _read(path: Path, columns: str = "") -> _List:
     }
     system, notes = _system(everything, header, by_meaning)
     above = [line for line in everything.lines[: header.line or 0] if not line.startswith("#")]
-    titles = tuple(f"{path.name}: '{line[:60]}' above the names of the columns is not used" for line in above)
+    titles = (left_behind(f"{path.name}: '{line[:60]}' above the names of the columns is not used") for line in above)
     return _List(everything, rows, by_meaning, header.columns, system, (*everything.notes, *titles, *notes))
 
 
@@ -141,10 +142,10 @@ def _notes(header: Header, name: str) -> tuple[str, ...]:
     said = []
     for column in header.columns:
         if column.unit and np.isnan(column.factor):
-            said.append(f"{name}: what stands in brackets in '{column.name}' is not used")
+            said.append(left_behind(f"{name}: what stands in brackets in '{column.name}' is not used"))
         elif column.unit and column.factor != 1.0:
             unit = "degrees" if column.meaning in IN_DEGREES else "metres"
-            said.append(f"{name}: column '{column.name}' was brought to {unit}")
+            said.append(taken(f"{name}: column '{column.name}' was brought to {unit}"))
     return tuple(said)
 
 
@@ -182,7 +183,7 @@ def _sigma(found: _List, may_be_zero: bool = False) -> tuple[np.ndarray, tuple[s
     said: tuple[str, ...] = ()
     if [name for name in SIGMAS if name in found.columns] == ["sX"]:
         # Metashape names the one accuracy after the first axis
-        said = (f"{found.file.path.name}: the accuracy of X is the only one, and counts for Y and Z too",)
+        said = (assumed(f"{found.file.path.name}: the accuracy of X is the only one, and counts for Y and Z too"),)
         sigma = np.repeat(found.numbers("sX"), 3, axis=1)
     else:
         sigma = found.numbers("sX", "sY", "sZ")
@@ -202,7 +203,7 @@ def _messages(found: _List, *used: str) -> tuple[str, ...]:
     left = [column.name for column in found.header if column.name and column.meaning not in used_now]
     shown = ", ".join(name[:40] for name in left[:MOST_NAMED])
     more = f" and {len(left) - MOST_NAMED} more" if len(left) > MOST_NAMED else ""
-    said = f"{found.file.path.name}: columns not carried over: {shown}{more}"
+    said = left_behind(f"{found.file.path.name}: columns not carried over: {shown}{more}")
     return (*found.notes, *((said,) if left else ()))
 
 

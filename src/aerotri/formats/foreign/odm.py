@@ -20,6 +20,7 @@ from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.parts import PointList, PositionList, RayList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.foreign.list_systems import in_words, order_of_axes, refuse_unknown_heights
+from aerotri.formats.text.notes import assumed, left_behind
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, check_words, first_lines, is_number
 from aerotri.observations import Block
@@ -177,9 +178,8 @@ def _about_heights(path: Path, heights: np.ndarray, what: str) -> tuple[str, ...
     zero, unknown = int(np.sum(heights == 0.0)), int(np.isnan(heights).sum())
     said = []
     if zero:
-        said.append(
-            f"{path.name}: the height of {counted(zero, what)} is 0 and taken as known: write NaN if it is unknown"
-        )
+        about = f"{path.name}: the height of {counted(zero, what)} is 0 and taken as known"
+        said.append(assumed(f"{about}: write NaN if it is unknown"))
     if unknown:
         said.append(f"{path.name}: the height of {counted(unknown, what)} is unknown")
     return tuple(said)
@@ -226,9 +226,11 @@ def read_odm_geo(path: FilePath, exchanged: bool = False) -> PositionList:
     there = ~np.isnan(values[:, 2])
     said = [*messages, *_about_heights(file.path, values[there, 2], "photograph")]
     if not there.all():
-        said.append(f"{file.path.name}: {counted(int((~there).sum()), 'position')} without height left out")
+        about = f"{file.path.name}: {counted(int((~there).sum()), 'position')} without height left out"
+        said.append(left_behind(about))
     if extra:
-        said.append(f"{file.path.name}: what follows the known columns in {counted(extra, 'row')} was not carried over")
+        about = f"{file.path.name}: what follows the known columns in {counted(extra, 'row')} was not carried over"
+        said.append(left_behind(about))
     return PositionList(
         file.path,
         texts(names)[there],

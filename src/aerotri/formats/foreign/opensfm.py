@@ -28,6 +28,7 @@ from aerotri.formats.foreign.opensfm_json import Node, largest, points_of, read_
 from aerotri.formats.foreign.opensfm_rigs import RigShots, rig_shots, rigs_of, split_cameras, stations_of
 from aerotri.formats.foreign.opensfm_tracks import HEADER, TRACKS, Tracks, read_tracks, track_line
 from aerotri.formats.results.json_text import json_text
+from aerotri.formats.text.notes import assumed, left_behind, taken
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.functional_model.rotation import angles_from_rotation, exponential, logarithm
 from aerotri.observations import (
@@ -128,9 +129,10 @@ def read_opensfm(path: FilePath, pixel_um: float = 1.0) -> Reading:
     if origin is not None:
         lon, lat, height = origin
         words = f"latitude {lat:.9g}, longitude {lon:.9g}, height {height:.6g} m"
-        messages.append(f"coordinates are local, around {words}")
+        messages.append(taken(f"coordinates are local, around {words}"))
     if _is_frozen(path.with_name(CONFIG)):
-        messages.append("OpenSfM held focal lengths and lens (optimize_camera_parameters: no); here they are unknowns")
+        about = "OpenSfM held focal lengths and lens (optimize_camera_parameters: no); here they are unknowns"
+        messages.append(assumed(about))
     return Reading(block, xyz[used], tuple(messages), origin)
 
 
@@ -191,7 +193,7 @@ def _tracks(path: Path, images: list[str], points: list[str]) -> tuple[Tracks, l
         return nothing, [f"there is no {TRACKS} beside {RECONSTRUCTION}: no image points"]
     found = read_tracks(path, images, points)
     others = f"left out: {counted(found.left, 'image point')} of other photographs, or without object point"
-    return found, [others] if found.left else []
+    return found, [left_behind(others)] if found.left else []
 
 
 def _image_points(tracks: Tracks, cameras: tuple[Camera, ...], camera_of_image: np.ndarray) -> np.ndarray:
@@ -220,9 +222,8 @@ def _observed(chosen: Node, shots: dict[str, Node]) -> tuple[GnssIns | None, lis
             sigma.append([dop] * 3)
     said = []
     if unknown_places:
-        said = [
-            f"{counted(unknown_places, 'photograph')} without GNSS position (gps_dop is OpenSfM's {NO_POSITION:.0f})"
-        ]
+        many = counted(unknown_places, "photograph")
+        said = [left_behind(f"{many} without GNSS position (gps_dop is OpenSfM's {NO_POSITION:.0f})")]
     if not rows:
         return None, [
             *said,
@@ -232,7 +233,7 @@ def _observed(chosen: Node, shots: dict[str, Node]) -> tuple[GnssIns | None, lis
     observed = GnssIns(np.array(rows, np.int64), np.array(xyz), np.array(sigma), unknown, unknown, unknown[:, 0])
     return observed, [
         *said,
-        f"{counted(len(rows), 'GNSS position')} used as observations, with gps_dop as standard deviation",
+        taken(f"{counted(len(rows), 'GNSS position')} used as observations, with gps_dop as standard deviation"),
     ]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from aerotri.conventions import InputError, counted
 from aerotri.foreign_json import read_foreign_json
+from aerotri.formats.text.notes import left_behind
 
 LARGEST = 1e9
 """Largest number of a reconstruction; chosen [C]: beyond every coordinate in metres and every pixel; squares of it keep
@@ -92,7 +93,7 @@ def largest(nodes: list[Node]) -> tuple[Node, list[str]]:
     best = sizes.index(max(sizes))
     smaller = counted(len(nodes) - 1, "smaller reconstruction")
     others = f"left out: {smaller} with {counted(sum(sizes) - sizes[best], 'photograph')}"
-    return nodes[best], [others] if len(nodes) > 1 else []
+    return nodes[best], [left_behind(others)] if len(nodes) > 1 else []
 
 
 def points_of(section: Node) -> tuple[list[str], np.ndarray]:

@@ -20,6 +20,7 @@ from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, RayList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.foreign.bingo import FARTHEST_MM
+from aerotri.formats.text.notes import assumed, left_behind
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, first_lines, is_number
 from aerotri.observations import Block
@@ -100,8 +101,9 @@ class ImPart:
 
 def about_im(in_mm: bool, classes: frozenset[tuple[str, ...]]) -> tuple[str, ...]:
     """What to say of an .im file with these classes of image points."""
-    said = ["coordinates are taken as mm: the principal distances are below 1000"] if in_mm else []
-    return (*said, *(["could not be carried over: the classes of the image points"] if len(classes) > 1 else []))
+    said = [assumed("coordinates are taken as mm: the principal distances are below 1000")] if in_mm else []
+    lost = left_behind("could not be carried over: the classes of the image points")
+    return (*said, *([lost] if len(classes) > 1 else []))
 
 
 def no_measurements(file: TextFile) -> InputError:
@@ -258,9 +260,11 @@ def read_patb_con(path: FilePath) -> PointList:
     kept = wanted.any(axis=1)
     messages = []
     if not kept.all():
-        messages.append(f"left out: {counted(int((~kept).sum()), 'point')} of classes 0 0, which are not control")
+        about = f"left out: {counted(int((~kept).sum()), 'point')} of classes 0 0, which are not control"
+        messages.append(left_behind(about))
     if len({tuple(line[4:]) for line in words}) > 1:
-        messages.append("could not be carried over: the classes of the control points, but for 0 as unknown")
+        about = "could not be carried over: the classes of the control points, but for 0 as unknown"
+        messages.append(left_behind(about))
     xyz = np.where(wanted, xyz, np.nan)[kept]
     return PointList(
         file.path, texts(names)[kept], xyz, no_sigma(len(xyz)), np.zeros(len(xyz), bool), messages=tuple(messages)

@@ -20,6 +20,7 @@ from aerotri.formats.assembly.parts import OrientationList, PointList, PositionL
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.foreign.list_header import is_named
 from aerotri.formats.foreign.list_systems import order_of_axes, refuse_unknown_heights, system_above
+from aerotri.formats.text.notes import assumed
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, check_words, first_lines
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
@@ -155,7 +156,7 @@ def _guessed(file: TextFile, values: np.ndarray, axes: str, has_angles: bool = F
         *accuracies.get(left, ()),
     )
     said = f"{file.path.name}: no line names the columns; taken as {', '.join(columns)}"
-    return (*file.notes, f"{said}: state others with --columns")
+    return (*file.notes, assumed(f"{said}: state others with --columns"))
 
 
 def _rows(path: Path, widths: tuple[int, ...], form: str, what: str) -> tuple[TextFile, list[str], np.ndarray]:

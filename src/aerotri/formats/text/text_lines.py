@@ -12,6 +12,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.formats.text.csv_text import read_bytes
 from aerotri.formats.text.encodings import decoded, head_decoded
+from aerotri.formats.text.notes import assumed
 from aerotri.formats.text.tables import CONTROL_CHARACTERS, LARGEST_NUMBER, LONGEST_NAME, NUMBER
 
 HEAD = 32768
@@ -45,7 +46,7 @@ class TextFile:
     ):
         self.path = path
         found = decoded(read_bytes(path) if part is None else part, path, first_line, any_letters)
-        self.notes = (found.note,) if found.note else ()
+        self.notes = (assumed(found.note),) if found.note else ()
         raw = found.text.split("\n")
         lines = [line.strip(" \r\v\f") if keep_tabs and line.strip() else line.strip() for line in raw]
         kept = [(i, line) for i, line in enumerate(lines) if line and not (comments and line[0] == "#")]
