@@ -16,6 +16,21 @@ HALF = re.compile(rf"(?<!\\)(?:\\\\)*(?:{HIGH}(?!{LOW})|(?<!\\u[dD][89abAB]..){L
 """Half of a pair of escapes that make one character together."""
 
 
+HEAD = 1 << 16
+"""Bytes that tell what a file holds [C]."""
+
+
+def json_head(path: Path, endings: tuple[str, ...] = (".json",)) -> str:
+    """The beginning of a file of one of these endings; '' where there is none, or it cannot be read."""
+    try:
+        if path.suffix.lower() not in endings or not path.is_file():
+            return ""
+        with path.open("rb") as file:
+            return file.read(HEAD).decode("utf-8", errors="replace")
+    except OSError:
+        return ""
+
+
 def read_foreign_json(path: Path, remedy: str) -> Any:
     """What a JSON file holds.
 

@@ -23,6 +23,7 @@ from aerotri.formats.foreign.metashape import read_metashape
 from aerotri.formats.foreign.named_lists import read_control_list, read_named_orientations, read_positions
 from aerotri.formats.foreign.odm import read_odm_gcp, read_odm_geo
 from aerotri.formats.foreign.opensfm import read_opensfm
+from aerotri.formats.foreign.opensfm_gcp import read_opensfm_gcp
 from aerotri.formats.foreign.orientation_list import read_orientation_list, read_ortho_camera
 from aerotri.formats.foreign.patb import read_patb_con, read_patb_im, read_patb_ori
 from aerotri.formats.foreign.pix4d import read_pix4d_eo, read_pix4d_gcp, read_pix4d_geo, read_pix4d_offset
@@ -33,6 +34,7 @@ from formats.foreign.test_bingo import SMALL as BINGO
 from formats.foreign.test_bundler import BUNDLE
 from formats.foreign.test_ign import APP, CAMERA, MES, OPK
 from formats.foreign.test_opensfm import CONTENT, TRACKS
+from formats.foreign.test_opensfm_gcp import GCP as GCP_JSON
 from formats.foreign.test_orientation_lists import EO, NAMED, PLAIN, YAML, rows
 from formats.foreign.test_patb import CON, IM, ORI
 from formats.foreign.test_point_lists import GCP, GEO, NATIVE, ODM_GCP, ODM_GEO, POSITIONS_LIST
@@ -54,6 +56,7 @@ READERS = {
     "odm gcp": (read_odm_gcp, ODM_GCP),
     "odm geo": (read_odm_geo, ODM_GEO),
     "opensfm": (read_opensfm, json.dumps(CONTENT)),
+    "opensfm gcp": (read_opensfm_gcp, json.dumps(GCP_JSON)),
     "ortho camera": (read_ortho_camera, YAML),
     "patb con": (read_patb_con, CON),
     "patb im": (read_patb_im, IM),

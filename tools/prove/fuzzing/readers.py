@@ -6,6 +6,7 @@ Measures single readers, of which some stand behind commands that take long: imp
 from __future__ import annotations
 
 import contextlib
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -40,6 +41,7 @@ def _lists(written: dict[str, dict[str, bytes]]) -> list[Target]:
         "patb-im": [written["patb"]["x/block.im"]],
         "bingo": [written["bingo"]["x"]],
         "ign-mes": [written["ign-mes"]["x"], seeds.real("ultracam_eagle_m3", "liaisons_test.mes")],
+        "opensfm-gcp": [json.dumps(seeds.of_tests("test_opensfm_gcp").GCP).encode()],
         "odm-gcp": [lists.ODM_GCP.encode(), written["odm-gcp"]["x"]],
         "pix4d-eo": [extra.EO.encode(), written["pix4d-eo"]["x"]],
         "metashape": [written["metashape"]["x"]],

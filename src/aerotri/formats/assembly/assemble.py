@@ -147,6 +147,9 @@ def rays_to_mm(xy: np.ndarray, unit: str, camera: np.ndarray, cameras: tuple[Cam
     """(m, 2) mm of image points in a unit of `RayList`, of cameras (m,)."""
     if unit == "mm":
         return xy
+    if unit == "part":
+        longer = np.array([max(one.size_px) * one.pixel_mm for one in cameras])[camera]
+        return xy * np.column_stack([longer, -longer])
     found = np.empty_like(xy)
     for number, one in enumerate(cameras):
         own = camera == number

@@ -18,6 +18,7 @@ from aerotri.formats.foreign.list_header import is_named_list, is_named_orientat
 from aerotri.formats.foreign.metashape import is_metashape, read_metashape
 from aerotri.formats.foreign.named_lists import read_control_list, read_named_orientations, read_positions
 from aerotri.formats.foreign.odm import is_odm_gcp, is_odm_geo, read_odm_gcp, read_odm_geo
+from aerotri.formats.foreign.opensfm_gcp import is_opensfm_gcp, read_opensfm_gcp
 from aerotri.formats.foreign.orientation_list import is_orientation_list, read_orientation_list
 from aerotri.formats.foreign.patb import (
     ROTATIONS,
@@ -93,6 +94,7 @@ POSITIONS: Kinds = {
     "pix4d-geo": (is_pix4d_geo, lambda path, options: read_pix4d_geo(path, options.axes)),
 }
 CONTROL: Kinds = {
+    "opensfm-gcp": (is_opensfm_gcp, lambda path, _: read_opensfm_gcp(path)),
     "odm-gcp": (is_odm_gcp, lambda path, options: read_odm_gcp(path, options.exchanged)),
     "csv": (is_named_list, lambda path, options: read_control_list(path, options.columns, options.exchanged)),
     "pix4d-gcp": (is_pix4d_gcp, lambda path, options: read_pix4d_gcp(path, options.axes)),

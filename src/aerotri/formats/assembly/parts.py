@@ -24,7 +24,8 @@ class RayList:
     points : (N,) str.
     image, point : (m,) index into these.
     xy : (m, 2) in `unit`.
-    unit : 'mm' from the image centre, y up; 'px' column and row, 0 the upper left corner.
+    unit : 'mm' from the image centre, y up; 'px' column and row, 0 the upper left corner; 'part' of the longer side
+        of the format, from the image centre, y down.
     focal_length_mm : (n,) of each photograph, NaN where the file does not say.
     messages : what the user should know.
     """

@@ -41,6 +41,7 @@ from aerotri.formats.foreign.ign import files_of, is_ign, is_ign_camera, read_ig
 from aerotri.formats.foreign.list_header import has_attitudes
 from aerotri.formats.foreign.metashape_project import read_metashape_project
 from aerotri.formats.foreign.opensfm import read_opensfm
+from aerotri.formats.foreign.opensfm_gcp import NAME as OPENSFM_GCP
 from aerotri.formats.foreign.pix4d import read_pix4d_offset
 from aerotri.formats.text.notes import assumed
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images
@@ -51,6 +52,8 @@ UNKNOWN_PIXEL_UM = 1.0
 """Size of a pixel where nothing tells it; a principal distance of 3000 pixels then reads 3 mm."""
 MAY_FREE = ("blocks-exchange", "bundler", "colmap", "metashape-project", "opensfm")
 """Whole blocks whose interior elements --free-interior makes unknowns."""
+CONTROL_BESIDE = (OPENSFM_GCP, "gcp_list.txt")
+"""Control points of OpenSfM beside its reconstruction."""
 SHIFTS = ("off", "block", "strip")
 _Read = TypeVar("_Read")
 
@@ -243,7 +246,7 @@ def _as_it_is(request: Request, sources: Sources) -> Reading | None:
             (block, points), heard = _with_warnings(lambda pixel=pixel_um: sources.colmap(path, pixel))
             return Reading(block, points, (*heard, *said))
         read = read_bundler(path, pixel_um, size_px) if kind == "bundler" else read_opensfm(path, pixel_um)
-        return replace(read, messages=(*read.messages, *said))
+        return replace(read, messages=(*read.messages, *_control_beside(path, kind, request.control), *said))
     if pixel_um is not None:
         raise InputError("has cameras of its own", "leave --pixel-um out", path)
     if kind == "block":
@@ -266,6 +269,13 @@ def _with_warnings(read: Callable[[], _Read]) -> tuple[_Read, tuple[str, ...]]:
 
 def _about_pixel(pixel_um: float) -> str:
     return assumed(f"a pixel counts as {pixel_um:g} µm: state it with --pixel-um")
+
+
+def _control_beside(path: Path, kind: str, control: str) -> tuple[str, ...]:
+    """Sentences on OpenSfM's lists of control points beside a reconstruction that are not read."""
+    folder = path if path.is_dir() else path.parent
+    found = [name for name in CONTROL_BESIDE if (folder / name).is_file()] if kind == "opensfm" and not control else []
+    return tuple(f"{name} beside it is not read: add it with --control {folder / name}" for name in found)
 
 
 def _parts(request: Request, options: ReadingOptions, sources: Sources) -> _Parts:
