@@ -43,7 +43,7 @@ from aerotri.formats.foreign.metashape_project import read_metashape_project
 from aerotri.formats.foreign.opensfm import read_opensfm
 from aerotri.formats.foreign.opensfm_gcp import NAME as OPENSFM_GCP
 from aerotri.formats.foreign.pix4d import read_pix4d_offset
-from aerotri.formats.text.notes import assumed
+from aerotri.formats.text.notes import assumed, left_behind
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images
 
 FOLDERS = {"ign": "IGN", "patb": "PAT-B"}
@@ -275,7 +275,7 @@ def _control_beside(path: Path, kind: str, control: str) -> tuple[str, ...]:
     """Sentences on OpenSfM's lists of control points beside a reconstruction that are not read."""
     folder = path if path.is_dir() else path.parent
     found = [name for name in CONTROL_BESIDE if (folder / name).is_file()] if kind == "opensfm" and not control else []
-    return tuple(f"{name} beside it is not read: add it with --control {folder / name}" for name in found)
+    return tuple(left_behind(f"{name} beside it is not read: add it with --control {folder / name}") for name in found)
 
 
 def _parts(request: Request, options: ReadingOptions, sources: Sources) -> _Parts:

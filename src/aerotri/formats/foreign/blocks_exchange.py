@@ -28,6 +28,7 @@ from aerotri.formats.foreign.blocks_exchange_xml import (
 from aerotri.formats.foreign.colmap_rigs import COLMAP_FROM_CAMERA
 from aerotri.formats.foreign.reconstruction import Reconstruction, check_names, names_of_paths
 from aerotri.formats.foreign.world_systems import WorldSystem, coordinates_in, placed, target_of
+from aerotri.formats.text.notes import assumed, left_behind, taken
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import first_lines
 from aerotri.formats.text.xml_text import read_xml
@@ -128,7 +129,7 @@ def _largest_block(root: Element, path: Path) -> tuple[XmlPlace, list[str]]:
     chosen = blocks[sizes.index(max(sizes))]
     name = chosen.text("Name") or chosen.where
     others = f"of {len(blocks)} blocks '{name[:60]}' is read, the one with most photographs"
-    return chosen.name(f"block '{name[:60]}'"), [others] if len(blocks) > 1 else []
+    return chosen.name(f"block '{name[:60]}'"), [left_behind(others)] if len(blocks) > 1 else []
 
 
 def _photos(block: XmlPlace, systems: Systems, system: WorldSystem) -> _Photos:
@@ -250,16 +251,18 @@ def _in_its_system(
     of_control = [one for one, xyz in zip(control.systems, control.xyz, strict=True) if np.isfinite(xyz).any()]
     others = [*of_control, *(pose.system for pose in observed if pose.system is not None)]
     target = target_of(photos.system, reading.block.images.centre, others)
-    said = list(dict.fromkeys(one.note for one in (photos.system, *others) if one.note))
+    said: list[str] = list(dict.fromkeys(taken(one.note) for one in (photos.system, *others) if one.note))
     if photos.system.kind == "local" and target != "local":
         nothing = no_sigma(len(photos.names))
         block = replace(reading.block, crs=target, images=replace(reading.block.images, centre=nothing, angles=nothing))
         reading = Reading(block)
-        said.append(f"orientations are in local coordinates, control points in {target}: no start orientations")
+        said.append(
+            left_behind(f"orientations are in local coordinates, control points in {target}: no start orientations")
+        )
     else:
         reading = placed(reading, photos.system, target, path, geoid)
         if photos.system.kind not in ("local", "plane"):
-            said.append(f"{photos.system.in_words}: orientations were brought to {target}")
+            said.append(taken(f"{photos.system.in_words}: orientations were brought to {target}"))
     block, about_control = _with_control(reading.block, control, target, path, geoid)
     block, about_positions = _with_positions(block, photos, target, path, geoid)
     return replace(reading, block=block), [*said, *about_control, *about_positions]
@@ -280,7 +283,7 @@ def _with_control(
     said = f"{counted(count, 'control point')} without accuracy: {CONTROL_SIGMA_M:g} m is taken"
     if not len(keep):
         return replace(block, control=found), []
-    return replace(_on_datum(block), control=found), [said] if count else []
+    return replace(_on_datum(block), control=found), [assumed(said)] if count else []
 
 
 def _with_positions(
@@ -298,9 +301,11 @@ def _with_positions(
     count = int(np.isnan(sigma).any(axis=1).sum())
     sigma = np.where(np.isnan(sigma), POSITION_SIGMA_M, sigma)
     unknown = no_sigma(len(rows))
-    said = [f"{counted(len(rows), 'position')} of photographs before the adjustment used as observations"]
+    said: list[str] = [
+        taken(f"{counted(len(rows), 'position')} of photographs before the adjustment used as observations")
+    ]
     if count:
-        said.append(f"{counted(count, 'position')} without accuracy: {POSITION_SIGMA_M:g} m is taken")
+        said.append(assumed(f"{counted(count, 'position')} without accuracy: {POSITION_SIGMA_M:g} m is taken"))
     return replace(_on_datum(block), gnss_ins=GnssIns(rows, xyz, sigma, unknown, unknown, unknown[:, 0])), said
 
 
@@ -314,9 +319,9 @@ def _about_photos(photos: _Photos, pixel_um: float | None) -> list[str]:
     for words, count in Counter(pose.left for pose in photos.poses if pose.left).items():
         said.append(f"not used: {words}, of {counted(count, 'photograph')}")
     if any(group.camera.focal_px[0] != group.camera.focal_px[1] for group in photos.groups):
-        said.append("AspectRatio is taken as focal length along y by that along x")
+        said.append(assumed("AspectRatio is taken as focal length along y by that along x"))
     if pixel_um is None and any(group.pixel_um is None for group in photos.groups):
-        said.append("a pixel counts as 1 µm: state it with --pixel-um")
+        said.append(assumed("a pixel counts as 1 µm: state it with --pixel-um"))
     return said
 
 

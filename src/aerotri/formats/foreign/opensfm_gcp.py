@@ -20,6 +20,7 @@ from aerotri.foreign_json import json_head, read_foreign_json
 from aerotri.formats.assembly.parts import PointList, RayList, no_sigma, texts
 from aerotri.formats.foreign.opensfm_json import Node
 from aerotri.formats.foreign.reconstruction import check_names
+from aerotri.formats.text.notes import left_behind
 
 NAME = "ground_control_points.json"
 REMEDY = "write the file again with OpenSfM"
@@ -68,7 +69,8 @@ def read_opensfm_gcp(path: FilePath) -> PointList:
                 xy.append(observed.get("projection").numbers(2))
     check_names(names, "point", path, "give every point an id of its own")
     unplaced = int(np.isnan(np.array(xyz, float).reshape(-1, 3)).all(axis=1).sum())
-    said = [] if not unplaced else [f"{path.name}: {counted(unplaced, 'point')} without position: not control points"]
+    words = f"{path.name}: {counted(unplaced, 'point')} without position: not control points"
+    said = [left_behind(words)] if unplaced else []
     return _point_list(path, system, (names, xyz, is_check), (images, image, point, xy), tuple(said))
 
 
