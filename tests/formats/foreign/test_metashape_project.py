@@ -17,6 +17,7 @@ from aerotri.coordinates.local_frame import topocentric_frame
 from aerotri.formats.assembly.oriented import oriented_block
 from aerotri.formats.convert import detect_format, write_oriented
 from aerotri.formats.foreign.metashape_files import open_project
+from aerotri.formats.foreign.metashape_markers import read_metashape_markers
 from aerotri.formats.foreign.metashape_project import read_metashape_project
 from aerotri.functional_model.additional_parameters import lens
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -294,3 +295,38 @@ def test_damaged_members_of_every_compression(tmp_path, method):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
         with pytest.raises(InputError):
             open_project(path)
+
+
+@pytest.mark.parametrize("system", ["utm", "degrees", "local"])
+def test_markers_alone(tmp_path, system):
+    """File > Export > Markers: added as control to a block from elsewhere, image points included."""
+    sample = Sample(system)
+    whole = sample.write(tmp_path, ".xml")
+    text = whole.read_text()
+    text = re.sub(r"(?s)<transform>.*?</transform>", "", text)
+    # exported markers have sensors without calibration
+    text = re.sub(r"(?s)<calibration.*?</calibration>", "", text)
+    path = tmp_path / "markers.xml"
+    path.write_text(text)
+    found = read_metashape_markers(path)
+    assert found.crs == {"utm": "EPSG:25832", "degrees": "EPSG:4258", "local": ""}[system]
+    assert found.is_check.tolist() == [False] * 4 + [True]
+    np.testing.assert_allclose(found.sigma[:2], [[0.03] * 3, [0.01, 0.02, 0.04]])
+    assert any("0.25 pixels" in text for text in found.messages)
+    without = re.sub(r"(?s)<markers>.*?</markers>", "", whole.read_text())
+    (tmp_path / "cameras.xml").write_text(re.sub(r"<frames.*?</frames>", "", without, flags=re.S))
+    reading = aerotri.read(tmp_path / "cameras.xml", control=str(path))
+    expected = aerotri.read(whole).block
+    block = reading.block
+    assert len(block.control) == 5
+    order = [block.points.tolist().index(name) for name in expected.points[expected.control.point].tolist()]
+    assert sorted(block.points[block.control.point].tolist()) == sorted(block.points[order].tolist())
+    np.testing.assert_allclose(block.control.xyz, expected.control.xyz, rtol=0, atol=1e-6)
+    assert len(block.image_points) == len(expected.image_points)
+
+
+def test_markers_that_are_not_there(tmp_path):
+    path = tmp_path / "markers.xml"
+    path.write_text('<document version="1.2.0"><chunk><cameras><camera id="0" label="a"/></cameras></chunk></document>')
+    with pytest.raises(InputError, match="holds no markers"):
+        read_metashape_markers(path)

@@ -41,6 +41,7 @@ def _lists(written: dict[str, dict[str, bytes]]) -> list[Target]:
         "patb-im": [written["patb"]["x/block.im"]],
         "bingo": [written["bingo"]["x"]],
         "ign-mes": [written["ign-mes"]["x"], seeds.real("ultracam_eagle_m3", "liaisons_test.mes")],
+        "metashape-markers": [seeds.metashape_project(".xml")["site.xml"]],
         "opensfm-gcp": [json.dumps(seeds.of_tests("test_opensfm_gcp").GCP).encode()],
         "odm-gcp": [lists.ODM_GCP.encode(), written["odm-gcp"]["x"]],
         "pix4d-eo": [extra.EO.encode(), written["pix4d-eo"]["x"]],

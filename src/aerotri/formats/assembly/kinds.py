@@ -16,6 +16,7 @@ from aerotri.formats.foreign.bingo import is_bingo, read_bingo
 from aerotri.formats.foreign.ign import is_ign_app, is_ign_mes, is_ign_opk, read_ign_app, read_ign_mes, read_ign_opk
 from aerotri.formats.foreign.list_header import is_named_list, is_named_orientations, stated_columns
 from aerotri.formats.foreign.metashape import is_metashape, read_metashape
+from aerotri.formats.foreign.metashape_markers import is_metashape_markers, read_metashape_markers
 from aerotri.formats.foreign.named_lists import read_control_list, read_named_orientations, read_positions
 from aerotri.formats.foreign.odm import is_odm_gcp, is_odm_geo, read_odm_gcp, read_odm_geo
 from aerotri.formats.foreign.opensfm_gcp import is_opensfm_gcp, read_opensfm_gcp
@@ -94,6 +95,7 @@ POSITIONS: Kinds = {
     "pix4d-geo": (is_pix4d_geo, lambda path, options: read_pix4d_geo(path, options.axes)),
 }
 CONTROL: Kinds = {
+    "metashape-markers": (is_metashape_markers, lambda path, _: read_metashape_markers(path)),
     "opensfm-gcp": (is_opensfm_gcp, lambda path, _: read_opensfm_gcp(path)),
     "odm-gcp": (is_odm_gcp, lambda path, options: read_odm_gcp(path, options.exchanged)),
     "csv": (is_named_list, lambda path, options: read_control_list(path, options.columns, options.exchanged)),

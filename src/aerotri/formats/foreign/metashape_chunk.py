@@ -180,7 +180,11 @@ def _values(calibration: Element | None, properties: dict[str, str], name: str, 
     keys = ("f", "cx", "cy", "b1", "b2", *RADIAL, "p1", "p2")
     if calibration is None:
         if not {"focal_length", "pixel_width"} <= set(properties):
-            raise InputError(f"sensor '{name[:60]}' has no calibration", "align the photographs", path)
+            raise InputError(
+                f"sensor '{name[:60]}' has no calibration",
+                "align the photographs; markers alone are given with --control",
+                path,
+            )
         focal = number(properties["focal_length"], f"focal_length of sensor '{name}'", path)
         pixel = number(properties["pixel_width"], f"pixel_width of sensor '{name}'", path)
         return dict.fromkeys(keys, 0.0) | {"f": focal / pixel if pixel > SMALLEST_POSITIVE else math.nan}

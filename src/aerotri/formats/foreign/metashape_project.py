@@ -8,7 +8,6 @@ confirmed (pinned). Markers whose reference is switched off are check points.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -28,7 +27,6 @@ from aerotri.formats.foreign.metashape_chunk import (
     crs_of,
     is_on,
     names_of,
-    number,
     numbers,
     other_components,
     place_of,
@@ -37,6 +35,7 @@ from aerotri.formats.foreign.metashape_chunk import (
     transform_of,
 )
 from aerotri.formats.foreign.metashape_files import REMEDY, Project, open_project, read_ply
+from aerotri.formats.foreign.metashape_markers import Rays, markers_of
 from aerotri.formats.foreign.reconstruction import unknown_lens, with_same_lens
 from aerotri.formats.text.notes import left_behind, taken
 from aerotri.formats.text.tables import LARGEST_FORMAT_PX, LARGEST_NUMBER
@@ -59,21 +58,6 @@ LARGEST_ID = 1 << 40
 """Of tie points [C]."""
 HIGHEST_M = 1e5
 """Above the ellipsoid, or below it [C]."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Rays:
-    """Image points.
-
-    Parameters
-    ----------
-    image, point : (m,) rows. px : (m, 2). sigma : (m,) pixels.
-    """
-
-    image: np.ndarray
-    point: np.ndarray
-    px: np.ndarray
-    sigma: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +101,11 @@ def read_metashape_project(path: FilePath, pixel_um: float | None = None) -> Rea
     path, chunk = project.path, project.chunk
     photographs = _photographs(chunk, pixel_um, path)
     accuracy, crs = accuracies_of(chunk, path), crs_of(chunk, path)
-    labels, xyz, sigma, is_check, marks, about_marks = _markers(project, photographs, accuracy)
+    markers = markers_of(project, photographs.row, accuracy)
+    labels, marks = markers.labels, markers.rays
     names, start, ties, about_ties = _tie_points(project, photographs, accuracy["tiepoints"], len(labels))
     prefix = "tie point " if any(label[:1] == "t" and label[1:].isdigit() for label in labels) else "t"
-    rays = _Rays(
+    rays = Rays(
         np.concatenate([marks.image, ties.image]),
         np.concatenate([marks.point, ties.point]),
         np.vstack([marks.px, ties.px]),
@@ -154,13 +139,13 @@ def read_metashape_project(path: FilePath, pixel_um: float | None = None) -> Rea
         ),
     )
     moved = _moved(Reading(block, np.vstack([no_sigma(len(labels)), start])), chunk, crs, path)
-    control = Control(np.arange(len(labels)), xyz, sigma, is_check)
+    control = Control(np.arange(len(labels)), markers.xyz, markers.sigma, markers.is_check)
     reading = _with_reference(moved, control, _positions(photographs, accuracy["cameras"], path), crs)
     rolling = any(node.find("rolling_shutter") is not None for node in photographs.elements)
     about = "rolling shutter corrections are not carried over: state [camera.NAME.rolling_shutter]"
     said = (left_behind(about),) * rolling
     return replace(
-        reading, messages=(*project.messages, *reading.messages, *of_parts, *about_marks, *about_ties, *said)
+        reading, messages=(*project.messages, *reading.messages, *of_parts, *markers.messages, *about_ties, *said)
     )
 
 
@@ -175,7 +160,7 @@ def _photographs(chunk: Element, pixel_um: float | None, path: Path) -> _Photogr
     return _Photographs(elements, names, {key: row for row, key in enumerate(names)}, sensors, sensor)
 
 
-def _image_points(rays: _Rays, cameras: tuple[Camera, ...], of_image: np.ndarray) -> ImagePoints:
+def _image_points(rays: Rays, cameras: tuple[Camera, ...], of_image: np.ndarray) -> ImagePoints:
     xy, sigma, of_ray = np.empty_like(rays.px), np.empty_like(rays.px), of_image[rays.image]
     for number_, camera in enumerate(cameras):
         own = of_ray == number_
@@ -232,58 +217,16 @@ def _poses(photographs: _Photographs, chunk: Element, path: Path) -> tuple[np.nd
     return centre, rotation, said
 
 
-def _markers(
-    project: Project, photographs: _Photographs, accuracy: Mapping[str, float]
-) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray, _Rays, list[str]]:
-    """Labels, coordinates, σ and whether check point of the markers, their image points, and what to say."""
-    path, elements = project.path, project.chunk.findall("markers//marker")
-    names = names_of(elements, "marker", path)
-    row = {key: k for k, key in enumerate(names)}
-    xyz, sigma = no_sigma(len(names)), no_sigma(len(names))
-    is_check = np.zeros(len(names), bool)
-    for k, node in enumerate(elements):
-        reference = node.find("reference")
-        if reference is not None:
-            xyz[k], sigma[k] = place_of(reference, accuracy["markers"], path)
-            is_check[k] = not is_on(reference, "enabled")
-    sigma[np.isnan(xyz)] = np.nan
-    image, point, px, left = [], [], [], 0
-    seen: set[tuple[int, int]] = set()
-    for node in project.frame.findall("markers/marker"):
-        marker = row.get(node.get("marker_id", ""))
-        if marker is None:
-            continue
-        for place in node.findall("location"):
-            photograph = photographs.row.get(place.get("camera_id", ""))
-            if photograph is None or not is_on(place, "pinned", "false") or not is_on(place, "valid"):
-                left += 1
-            elif (photograph, marker) in seen:
-                raise InputError(f"marker '{list(names.values())[marker][:60]}' is twice in a photograph", REMEDY, path)
-            else:
-                seen.add((photograph, marker))
-                image.append(photograph)
-                point.append(marker)
-                px.append([number(place.get(key), f"{key} of a marker", path) for key in ("x", "y")])
-    rays = _Rays(
-        np.array(image, np.int64),
-        np.array(point, np.int64),
-        np.array(px, float).reshape(-1, 2),
-        np.full(len(image), accuracy["projections"]),
-    )
-    about = f"left out: {counted(left, 'image point')} of markers, not pinned or of photographs switched off"
-    return list(names.values()), xyz, sigma, is_check, rays, [left_behind(about)] if left else []
-
-
 def _tie_points(
     project: Project, photographs: _Photographs, sigma_px: float, first: int
-) -> tuple[list[str], np.ndarray, _Rays, list[str]]:
+) -> tuple[list[str], np.ndarray, Rays, list[str]]:
     """Names and (N, 3) places in the chunk of the tie points, their image points, and what to say.
 
     Parameters
     ----------
     first : row of the first one among all points.
     """
-    nothing = _Rays(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(0))
+    nothing = Rays(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(0))
     cloud, path = project.cloud, project.path
     if cloud is None:
         return [], no_sigma(0), nothing, ["holds no tie points: only the image points of markers are read"]
@@ -316,7 +259,7 @@ def _tie_points(
     if not (np.abs(px) <= LARGEST_FORMAT_PX).all():
         raise InputError("an image point lies outside of any photograph", REMEDY, path)
     used, point = np.unique(point, return_inverse=True)
-    rays = _Rays(image.astype(np.int64), point.ravel() + first, px, np.full(len(image), sigma_px))
+    rays = Rays(image.astype(np.int64), point.ravel() + first, px, np.full(len(image), sigma_px))
     about = f"left out: {counted(left, 'image point')} of tie points without place, or twice in a photograph"
     return ids[used].astype(str).tolist(), xyz[used], rays, [left_behind(about)] if left else []
 
