@@ -344,6 +344,26 @@ def test_control_without_crs_keeps_positions(shift, crs, tmp_path):
         np.testing.assert_allclose(positions.xyz[0, :2], [500000.0, 5316300.0], atol=1000.0)
 
 
+def test_exif_without_altitude():
+    """Longitude and latitude still choose neighbours and the zone; why they are no positions is said."""
+    from dataclasses import replace
+
+    from aerotri.formats.text.notes import kind_of_note
+    from aerotri.tie_points.given import Given, approximate_places, crs_of, positions_in
+
+    whole = photographs_of_exif()
+    flat = replace(whole, lon_lat_height=whole.lon_lat_height * [1.0, 1.0, np.nan])
+    partly = replace(whole, lon_lat_height=np.vstack([whole.lon_lat_height[:1], flat.lon_lat_height[1:]]))
+    for photographs, known, named in ((flat, None, "a.jpg, b.jpg"), (partly, ["a.jpg"], "b.jpg")):
+        assert crs_of(photographs, Given()) == "EPSG:32632"
+        positions, said = positions_in(photographs, Given(), "EPSG:32632")
+        assert (None if positions is None else positions.images.tolist()) == known
+        assert f"({named}) without an altitude in EXIF" in said[0]
+        assert kind_of_note(said[0]) == "left behind"
+        places = approximate_places(photographs, positions, Given())
+        np.testing.assert_allclose(places[1, :2] - places[0, :2], [37.3, 0.0], atol=0.2)
+
+
 def test_marking_page_is_named(files, tmp_path, capsys):
     """Without a mark there is still something to do, and a page to do it on."""
     lines = (files[0] / "gcp_list.txt").read_text().splitlines()
@@ -404,3 +424,20 @@ def test_control_that_nobody_marked_is_in_the_block_to_be_marked(files, tied, tm
     assert found.points.shape == (len(block.points), 3)
     again = read_block(found.save(tmp_path / "block"))
     assert len(again.control) == len(points)
+
+
+def test_stated_values_in_place_of_exif_are_said(tmp_path):
+    """The focal length of EXIF is not lost without a word; the same value, rounded, is no other one."""
+    from PIL import Image
+
+    from aerotri.formats.foreign.exif import EXIF_IFD
+    from aerotri.tie_points.photographs import StatedCamera, find_photographs
+
+    for name, focal in (("a.jpg", 8.8), ("b.jpg", 8.8)):
+        image = Image.new("RGB", (80, 60))
+        exif = image.getexif()
+        exif.get_ifd(EXIF_IFD).update({37386: focal, 41989: 24})
+        image.save(tmp_path / name, exif=exif)
+    said = find_photographs(tmp_path, StatedCamera((), 6.0, None)).messages
+    assert said == ("--focal-length-mm 6 is used in place of 8.8 mm in EXIF of 2 photographs",)
+    assert find_photographs(tmp_path, StatedCamera((), 8.8, None)).messages == ()

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from aerotri.adjustment.ray_status import some_names
 from aerotri.coordinates.georeference import is_projected, utm_crs
 from aerotri.crs_text import plan_of
 from aerotri.formats.assembly import assemble, placing
@@ -47,7 +48,7 @@ def crs_of(photographs: PhotographSet, given: Given) -> str:
     if given.stated.crs:
         return placing.known_crs(given.stated.crs)
     lists = [part for part in (given.control, given.positions) if part is not None]
-    known = np.isfinite(photographs.lon_lat_height).all(axis=1)
+    known = photographs.in_plan
     utm = utm_crs(*photographs.lon_lat_height[known, :2].T) if known.any() else ""
     told = placing.system_of_lists(lists)
     if told:
@@ -73,16 +74,17 @@ def positions_in(photographs: PhotographSet, given: Given, crs: str) -> tuple[Po
     if given.positions is not None:
         return given.positions, ()
     known = np.flatnonzero(np.isfinite(photographs.lon_lat_height).all(axis=1))
+    without = _about_heights(photographs)
     if not len(known):
-        return None, ()
+        return None, without
     if crs == "local":
         control = given.control
         why = "the block has none" if control is None else f"{control.path.name} names none and is not in UTM"
         about = f"positions of EXIF were left out for want of a coordinate system: {why}; state it with --crs"
-        return None, (left_behind(about),)
+        return None, (left_behind(about), *without)
     xyz = photographs.lon_lat_height[known]
     flat = placing.to_crs(xyz, "EPSG:4326", plan_of(crs), None)
-    said = []
+    said = [*without]
     first = given.control or given.orientation
     if first is not None and not getattr(first, "crs", "") and not given.stated.crs:
         about = f"{crs}, in which it lies where the photographs were taken, is taken; state another with --crs"
@@ -102,8 +104,22 @@ def positions_in(photographs: PhotographSet, given: Given, crs: str) -> tuple[Po
     return PositionList(path, photographs.names[known], flat, sigma, no_sigma(len(known))), tuple(said)
 
 
+def _about_heights(photographs: PhotographSet) -> tuple[str, ...]:
+    """What to say of photographs whose EXIF tells longitude and latitude, and no height."""
+    rows = np.flatnonzero(photographs.in_plan & np.isnan(photographs.lon_lat_height[:, 2]))
+    if not len(rows):
+        return ()
+    names = some_names(photographs.names[rows], "photograph")
+    return (
+        left_behind(
+            f"{names} without an altitude in EXIF: longitude and latitude tell neighbours and the UTM zone, and are no "
+            "observed positions, which need a height; give these with --positions"
+        ),
+    )
+
+
 def approximate_places(photographs: PhotographSet, positions: PositionList | None, given: Given) -> np.ndarray:
-    """(n, 3) where photographs are, for the choice of neighbours alone."""
+    """(n, 3) where photographs are, for the choice of neighbours alone; of EXIF where that tells more of them."""
     found = no_sigma(len(photographs))
     for names, xyz in (
         *(((positions.images, positions.xyz),) if positions is not None else ()),
@@ -111,6 +127,11 @@ def approximate_places(photographs: PhotographSet, positions: PositionList | Non
     ):
         index = match_photographs(names, photographs.names)[0]
         found[index[index >= 0]] = xyz[index >= 0]
+    in_plan = photographs.in_plan
+    if in_plan.sum() > np.isfinite(found[:, :2]).all(axis=1).sum():
+        known = photographs.lon_lat_height[in_plan]
+        found = no_sigma(len(photographs))
+        found[in_plan] = placing.to_crs(known, "EPSG:4326", utm_crs(*known[:, :2].T), None)
     return found
 
 

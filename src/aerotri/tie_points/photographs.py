@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, counted
 from aerotri.formats.assembly.parts import texts
 from aerotri.formats.files.photograph_files import files_of
 from aerotri.formats.foreign.exif import PhotographTags, read_exif
+from aerotri.formats.text.notes import taken
 from aerotri.observations import Camera, Prior
 
 ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff")
@@ -20,6 +21,8 @@ LENS = ("k1", "k2", "p1", "p2", "k3")
 REMEDY = "state what is missing: --focal-length-mm 8.8 --pixel-um 2.4, or --camera FILE with tables [camera.NAME]"
 
 
+SAME = 1e-4
+"""Relative difference up to which a stated value and that of EXIF, which is rounded, are the same [C]."""
 DAY_S = 86400.0
 TIME = "time"
 """Column of images.csv."""
@@ -36,6 +39,7 @@ class PhotographSet:
     lon_lat_height : (n, 3) degrees and m; sigma_m : (n, 3) m; NaN where not known.
     ellipsoidal : (n,) bool, whether the height is said to count from the ellipsoid.
     time : (n,) s by the clock of the camera, NaN where not known.
+    messages : what the user should know of them.
     """
 
     paths: tuple[Path, ...]
@@ -46,6 +50,12 @@ class PhotographSet:
     sigma_m: np.ndarray
     ellipsoidal: np.ndarray
     time: np.ndarray | None = None
+    messages: tuple[str, ...] = ()
+
+    @property
+    def in_plan(self) -> np.ndarray:
+        """(n,) bool, whether longitude and latitude are known."""
+        return np.asarray(np.isfinite(self.lon_lat_height[:, :2]).all(axis=1))
 
     def __len__(self) -> int:
         return len(self.paths)
@@ -63,6 +73,7 @@ class PhotographSet:
             sigma_m=self.sigma_m[rows],
             ellipsoidal=self.ellipsoidal[rows],
             time=None if self.time is None else self.time[rows],
+            messages=self.messages,
         )
 
     def time_column(self, keep: np.ndarray) -> dict[str, np.ndarray]:
@@ -112,7 +123,23 @@ def find_photographs(folder: Path, stated: StatedCamera = StatedCamera()) -> Pho
         sigma_m=np.array([tag.sigma_m for tag in tags]),
         ellipsoidal=np.array([tag.ellipsoidal for tag in tags]),
         time=np.array([tag.time for tag in tags]),
+        messages=() if stated.cameras else _about_replaced(tags, stated),
     )
+
+
+def _about_replaced(tags: Sequence[PhotographTags], stated: StatedCamera) -> tuple[str, ...]:
+    """What to say of values of EXIF that a stated one stands in place of."""
+    said = []
+    for option, value, own, unit in (
+        ("--focal-length-mm", stated.focal_length_mm, [tag.focal_length_mm for tag in tags], "mm"),
+        ("--pixel-um", stated.pixel_um, [tag.pixel_um for tag in tags], "µm"),
+    ):
+        others = [one for one in own if one is not None and value is not None and abs(one / value - 1.0) > SAME]
+        if others:
+            values = ", ".join(f"{one:.6g}" for one in sorted(set(others))[:5])
+            many = counted(len(others), "photograph")
+            said.append(taken(f"{option} {value:g} is used in place of {values} {unit} in EXIF of {many}"))
+    return tuple(said)
 
 
 def _cameras(

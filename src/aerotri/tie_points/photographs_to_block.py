@@ -122,7 +122,7 @@ def tie_photographs(
     tracks, oriented = tracks.with_images(order), oriented.in_order(np.argsort(order), photographs.cameras)
     keep = np.bincount(tracks.image, minlength=len(photographs)) > 0
     block = _bare_block(photographs, oriented.cameras, tracks, measured.of(tracks), keep)
-    reading = complete(replace(Reading(block), messages=said), given, crs, positions)
+    reading = complete(replace(Reading(block), messages=(*photographs.messages, *said)), given, crs, positions)
     reading = with_start_values(reading, oriented.kept(keep))
     frame = oriented.frame
     placed_block = in_frame(reading.block, frame)

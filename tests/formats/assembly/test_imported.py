@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import jsonschema
+import numpy as np
 import pytest
 
 import aerotri
@@ -101,3 +102,26 @@ def test_a_note_is_a_text():
     assert json.dumps([note]) == json.dumps([str(note)])
     assert (kind_of_note(note), kind_of_note(str.__str__(note))) == ("assumed", "")
     assert kind_of_note("left out: 3 image points") == "left behind"
+
+
+@pytest.mark.parametrize(("stated", "replaced"), [(100.0, True), (8.8, False)])
+def test_principal_distance_in_place_of_that_of_the_file(tmp_path, stated, replaced):
+    """The heads of PAT-B name 8.8 mm, in µm."""
+    rows = "\n".join(f"{name} 8800\nK1 1000 2000\nT1 -1000 500\n-99" for name in ("P01", "P02"))
+    (tmp_path / "rays.im").write_text(rows + "\n")
+    read = aerotri.read(tmp_path / "rays.im", camera_size=(4000, 3000), pixel_um=2.4, focal_length_mm=stated)
+    about = "the principal distance of the camera, 100 mm, is used in place of 8.8 mm in the image points"
+    assert (about in read.imported.taken) == replaced
+
+
+def test_values_beside_cameras_of_files_are_refused(tmp_path):
+    """--focal-length-mm without a size describes no camera, and replaces none without a word."""
+    from aerotri.formats.assembly.camera_spec import CameraSpec, cameras_of
+    from aerotri.observations import Camera, Prior
+
+    interior = {"focal_length_mm": Prior(100.0), "x0_mm": Prior(0.0), "y0_mm": Prior(0.0)}
+    found = (Camera("uce", "frame", (4000, 3000), 2.4, interior),)
+    for spec in (CameraSpec(focal_length_mm=8.8), CameraSpec(name="other")):
+        with pytest.raises(aerotri.InputError, match=r"the files describe their cameras \(uce\)"):
+            cameras_of(spec, found, np.zeros(0, str), np.zeros(0))
+    assert cameras_of(CameraSpec(), found, np.zeros(0, str), np.zeros(0)) == found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from PIL import Image
+from PIL.TiffImagePlugin import IFDRational
 
 from aerotri.conventions import InputError
 from aerotri.formats.foreign.exif import EXIF_IFD, GPS_IFD, read_exif
@@ -70,12 +71,21 @@ def test_standard_deviations(tmp_path):
     [
         {1: "N", 2: (0.0, 0.0, 0.0), 3: "E", 4: (0.0, 0.0, 0.0), 6: 7.0},
         {1: "N", 2: (95.0, 0.0, 0.0), 3: "E", 4: (1.0, 0.0, 0.0), 6: 7.0},
-        {1: "N", 2: (10.0, 0.0, 0.0), 3: "E", 4: (1.0, 0.0, 0.0)},
+        {1: "N", 2: (10.0, 0.0, 0.0), 6: 7.0},
     ],
-    ids=["null island", "beyond the pole", "no height"],
+    ids=["null island", "beyond the pole", "no longitude"],
 )
 def test_positions_that_are_none(tmp_path, gps):
     assert np.isnan(photograph(tmp_path / "a.jpg", {}, gps).lon_lat_height).all()
+
+
+@pytest.mark.parametrize(
+    "altitude", [{}, {6: IFDRational(0, 0)}, {5: b"\x02"}], ids=["none", "no number", "reference alone"]
+)
+def test_longitude_and_latitude_without_a_height(tmp_path, altitude):
+    tags = photograph(tmp_path / "a.jpg", {}, {1: "N", 2: (10.0, 0.0, 0.0), 3: "W", 4: (1.0, 30.0, 0.0), **altitude})
+    np.testing.assert_array_equal(tags.lon_lat_height, [-1.5, 10.0, np.nan])
+    assert not tags.ellipsoidal
 
 
 def test_files_without_tags_and_no_files(tmp_path):

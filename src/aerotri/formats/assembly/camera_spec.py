@@ -12,11 +12,13 @@ from aerotri.formats.foreign.bingo import format_in_name
 from aerotri.formats.foreign.ign import is_ign_camera, read_ign_camera
 from aerotri.formats.foreign.metashape_camera import is_metashape_camera, read_metashape_camera
 from aerotri.formats.foreign.orientation_list import is_ortho_camera, read_ortho_camera
-from aerotri.formats.text.notes import assumed, left_behind
+from aerotri.formats.text.notes import assumed, left_behind, taken
 from aerotri.observations import Camera, Prior
 
 SAME_FORMAT = 0.01
 """Relative difference between a format stated and one told by a name above which they are two."""
+SAME_C = 1e-4
+"""Relative difference up to which two principal distances are one that is written with fewer digits [C]."""
 REMEDY = "state it: --camera FILE, or --camera-size 8192x5460 --pixel-um 4.27 --focal-length-mm 35"
 
 
@@ -67,12 +69,41 @@ def cameras_of(spec: CameraSpec, found: tuple[Camera, ...], named: np.ndarray, c
     elif spec.size_px is not None:
         cameras = (_from_options(spec, named, c_mm),)
     elif found:
+        _refuse_values(spec, found)
         cameras = found
     else:
         raise InputError("the camera is not known", REMEDY)
     if spec.flight_axis is not None:
         cameras = tuple(replace(camera, flight_axis=spec.flight_axis) for camera in cameras)
     return tuple(freed(camera) for camera in cameras) if spec.free else cameras
+
+
+def _refuse_values(spec: CameraSpec, found: tuple[Camera, ...]) -> None:
+    """Refuse values that would have to replace those of the cameras found; without a size they describe none."""
+    names = ", ".join(camera.name for camera in found[:5])
+    for option, value in (("--focal-length-mm", spec.focal_length_mm), ("--camera-name", spec.name or None)):
+        if value is not None:
+            remedy = f"leave {option} out, or describe the whole camera: --camera FILE, or --camera-size too"
+            raise InputError(f"{option} {value}: the files describe their cameras ({names})", remedy)
+
+
+def about_replaced(cameras: tuple[Camera, ...], c_mm: np.ndarray) -> tuple[str, ...]:
+    """What to say of principal distances of files that those of the cameras stand in place of.
+
+    Parameters
+    ----------
+    c_mm : principal distances from the files of image points, NaN where they say none.
+    """
+    known = np.unique(c_mm[np.isfinite(c_mm)])
+    used = np.array([camera.focal_length_mm for camera in cameras])
+    others = [c for c in known.tolist() if (np.abs(c / used - 1.0) > SAME_C).all()]
+    if not others:
+        return ()
+    shown = ", ".join(f"{c:.6g}" for c in others[:5])
+    own = ", ".join(f"{c:.6g}" for c in used.tolist())
+    return (
+        taken(f"the principal distance of the camera, {own} mm, is used in place of {shown} mm in the image points"),
+    )
 
 
 def freed(camera: Camera) -> Camera:

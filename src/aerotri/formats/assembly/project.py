@@ -21,7 +21,7 @@ from aerotri.formats import convert
 from aerotri.formats.assembly import kinds, placing
 from aerotri.formats.assembly.assemble import Statements, with_crs, with_orientations, with_positions, with_rays
 from aerotri.formats.assembly.assemble_control import with_check_points, with_control
-from aerotri.formats.assembly.camera_spec import CameraSpec, camera_of_each, cameras_of, freed
+from aerotri.formats.assembly.camera_spec import CameraSpec, about_replaced, camera_of_each, cameras_of, freed
 from aerotri.formats.assembly.kinds import ReadingOptions
 from aerotri.formats.assembly.parts import (
     OrientationList,
@@ -359,6 +359,7 @@ def _begin(request: Request, parts: _Parts) -> Reading:
             _, told = names_told(np.array(list(camera_of), dtype=str), request.station_pattern)
             camera_of = {image: name or of for (image, name), of in zip(camera_of.items(), told, strict=True)}
         cameras, camera, said = camera_of_each(cameras, list(camera_of.values()))
+        said = [*said, *about_replaced(cameras, c_mm)]
     except InputError as error:
         raise InputError(error.message, error.remedy, error.file or Path(request.source), error.line) from error
     count = len(camera_of)

@@ -145,21 +145,33 @@ def _pixel_um(tags: dict[int, Any], size: tuple[int, int], focal_mm: float | Non
 
 
 def _position(gps: dict[int, Any]) -> tuple[np.ndarray, bool]:
-    """Longitude, latitude, height, NaN where one is missing, and whether the height is ellipsoidal."""
+    """Longitude, latitude, height, NaN where one is missing, and whether the height is ellipsoidal.
+
+    A height alone says nothing; longitude and latitude without a height do.
+    """
     unknown = np.full(3, np.nan)
     try:
         lat = _degrees(gps[LATITUDE]) * (-1.0 if _text(gps[LATITUDE_REF]).upper() == "S" else 1.0)
         lon = _degrees(gps[LONGITUDE]) * (-1.0 if _text(gps[LONGITUDE_REF]).upper() == "W" else 1.0)
-        height = float(gps[ALTITUDE])
     except (KeyError, TypeError, ValueError, ZeroDivisionError):
         return unknown, False
-    place = np.array([lon, lat, height])
-    if not np.isfinite(place).all() or abs(lat) > 90.0 or abs(lon) > 180.0 or (lat == 0.0 and lon == 0.0):
+    if not np.isfinite([lon, lat]).all() or abs(lat) > 90.0 or abs(lon) > 180.0 or (lat == 0.0 and lon == 0.0):
         return unknown, False
+    height, ellipsoidal = _height(gps)
+    return np.array([lon, lat, height]), ellipsoidal
+
+
+def _height(gps: dict[int, Any]) -> tuple[float, bool]:
+    """m, NaN where there is none, and whether it is ellipsoidal."""
+    try:
+        height = float(gps[ALTITUDE])
+    except (KeyError, TypeError, ValueError, ZeroDivisionError):
+        return float("nan"), False
+    if not np.isfinite(height):
+        return float("nan"), False
     reference = gps.get(ALTITUDE_REF, 0)
     code = reference[0] if isinstance(reference, bytes) and reference else reference
-    place[2] *= -1.0 if code in (1, 3) else 1.0
-    return place, code in (2, 3)
+    return (-height if code in (1, 3) else height), code in (2, 3)
 
 
 def _degrees(value: Any) -> float:
