@@ -9,8 +9,16 @@ import pytest
 import scipy.spatial
 
 import aerotri
+from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
+from aerotri.adjustment.carry_over import start_values_at
+from aerotri.adjustment.prepare import prepare
+from aerotri.adjustment.ray_status import RayStatus
+from aerotri.adjustment.solve import SolveOptions
+from aerotri.adjustment.system import build_system
 from aerotri.diagnosis.control_points import doubts_of_control
 from aerotri.observations.block import Edits
+from aerotri.pipeline.contradicting_marks import with_fitting_marks
+from aerotri.statistics.summarise import count_observations
 from ten_photographs import ten_photographs
 
 
@@ -62,6 +70,37 @@ def test_a_mark_that_does_not_meet_the_others(ten):
         off = Edits(ten.image_points.image[rows[1:2]], ten.image_points.point[rows[1:2]], np.array(["off"]),
                     np.array([""]))  # fmt: skip
         assert about_control(texts(replace(block, edits=off))) == []
+
+
+def test_a_mark_far_off_is_left_out_of_a_robust_adjustment(ten):
+    """Named, and the same as if the operator had taken it out."""
+    row = marked_often(ten)[1]
+    block = aerotri.with_settings(with_mark_moved(ten, row, 400.0), robust="huber")
+    off = Edits(block.image_points.image[[row]], block.image_points.point[[row]], np.array(["off"]), np.array([""]))
+    result, wanted = aerotri.adjust(block), aerotri.adjust(replace(block, edits=off))
+    point, image = ten.points[ten.image_points.point[row]], ten.images.names[ten.image_points.image[row]]
+    assert f"1 mark left out, far from where the other photographs see it: {point} in {image}" in result.warnings
+    assert list(np.flatnonzero(np.asarray(result.rays["status"]) == "contradicting mark")) == [row]
+    assert result.sigma0 == pytest.approx(wanted.sigma0, rel=1e-6)
+    assert not any("left out" in text for text in aerotri.adjust(aerotri.with_settings(ten, robust="huber")).warnings)
+
+
+def test_a_mark_that_fits_after_all_comes_back(ten):
+    """Its photograph stood wrong at first."""
+    prepared = prepare(aerotri.with_settings(ten, robust="huber"))
+    status = prepared.ray_status.copy()
+    status[marked_often(ten)[1]] = RayStatus.CONTRADICTING
+    system, state = build_system(
+        prepared.system.unknowns.block, start_values_at(prepared.system.unknowns, prepared.state), status
+    )
+    options = SolveOptions(robust="huber")
+    left = replace(prepared, system=system, state=state, ray_status=status)
+    redundancy = count_observations(system).redundancy
+    system, solution = minimise_at_adjusted(system, state, redundancy, options)
+    back, again = with_fitting_marks(replace(left, system=system), solution, options)
+    assert again.status == "converged"
+    assert (back.ray_status == prepared.ray_status).all()
+    assert len(back.system.unknowns.rays.image) == len(system.unknowns.rays.image) + 1
 
 
 def test_two_marks_do_not_tell_which_is_wrong(ten):

@@ -21,6 +21,7 @@ class RayStatus(IntEnum):
     REMOVED = 5
     WEAK_POINT = 6
     WEAK_PHOTOGRAPH = 7
+    CONTRADICTING = 8
 
     @property
     def words(self) -> str:
@@ -30,9 +31,10 @@ class RayStatus(IntEnum):
 
 RAY_STATUS = (
     "used", "one ray", "off", "no start value", "not finite", "removed", "weak point", "weak photograph",
+    "contradicting mark",
 )  # fmt: skip
 """The words of every `RayStatus`: data snooping removes; a point is weak that its rays do not fix, a photograph that is
-tied too weakly."""
+tied too weakly; a mark of a control point contradicts the other marks of it."""
 
 WEAK_ENDINGS = (" too weakly tied to the others, set aside", " not fixed in distance by their rays, set aside")
 

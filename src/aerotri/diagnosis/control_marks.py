@@ -98,7 +98,8 @@ class _Rays:
 
 def contradictions_in_words(block: Block, found: Sequence[Contradiction]) -> tuple[str, ...]:
     """A sentence for every contradiction; one for those of a photograph that contradicts at several points."""
-    several = {one.wrong for one in found if one.wrong >= 0 and sum(other.wrong == one.wrong for other in found) > 1}
+    alone = alone_in_their_photograph(found)
+    several = {one.wrong for one in found if one.wrong >= 0} - {one.wrong for one in alone}
     said = [one.sentence(block) for one in found if one.wrong not in several]
     for image in sorted(several):
         names = listed(block.points[[one.point for one in found if one.wrong == image]])
@@ -107,6 +108,11 @@ def contradictions_in_words(block: Block, found: Sequence[Contradiction]) -> tup
             "photographs: look at its orientation, and whether the marks are of another photograph"
         )
     return tuple(said)
+
+
+def alone_in_their_photograph(found: Sequence[Contradiction]) -> list[Contradiction]:
+    """Those of a single mark: a photograph that contradicts at several points may be oriented wrongly itself."""
+    return [one for one in found if one.wrong >= 0 and sum(other.wrong == one.wrong for other in found) == 1]
 
 
 def marks_of(block: Block, centre: np.ndarray, rotation: np.ndarray) -> Marks:

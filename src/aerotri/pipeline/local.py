@@ -24,6 +24,7 @@ from aerotri.diagnosis.photograph_fields import photograph_fields_in_words
 from aerotri.diagnosis.position_errors import position_errors_in_words
 from aerotri.diagnosis.rigidity import movements_in_words, rigidity_in_words
 from aerotri.observations import Block
+from aerotri.pipeline.contradicting_marks import with_fitting_marks, without_contradicting_marks
 from aerotri.results.adjusted_block import AdjustedBlock, Blunder
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.deviations import Deviations
@@ -104,6 +105,8 @@ def adjust_local(block: Block, report: Report | None, given_points: np.ndarray |
     _refuse_without_datum(prepared)
     settings = block.settings.adjustment
     options = SolveOptions(settings.max_iterations, settings.robust, report)
+    if settings.robust != "off":
+        prepared = without_contradicting_marks(prepared)
     stand = _Stand(*_determined(_tied(prepared, options)), block)
     stand = _without_gross_errors(stand, options)
     stand = _with_fields(stand, options)
@@ -120,7 +123,8 @@ def adjust_local(block: Block, report: Report | None, given_points: np.ndarray |
 def _tied(prepared: Prepared, options: SolveOptions) -> tuple[Prepared, Solution]:
     """The first solution, without what is too weak, and with the points that ran away brought back."""
     prepared, solution = minimise_tied(prepared, options, _redundancy)
-    return with_runaways_back(prepared, solution, options, _redundancy)
+    prepared, solution = with_runaways_back(prepared, solution, options, _redundancy)
+    return with_fitting_marks(prepared, solution, options)
 
 
 def _refuse_without_datum(prepared: Prepared) -> None:

@@ -20,6 +20,7 @@ RAY_STATUS_MEANING = (
     "removed by data snooping",
     "its point is not fixed by its rays",
     "its photograph is too weakly tied to the others",
+    "a mark of a control point, far from where the other photographs see the point",
 )
 
 
