@@ -15,6 +15,7 @@ from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.diagnosis.doubts import failure
 from aerotri.execution.work import Workplace
 from aerotri.observations import Block, PhotographFieldSettings
+from aerotri.pipeline.contradicting_marks import without_contradicting_marks
 from aerotri.pipeline.starting import with_start
 from aerotri.pipeline.verdict import with_outcome
 from aerotri.results.adjustment import Adjustment
@@ -152,7 +153,7 @@ def _prepared_without(block: Block, geoid: FilePath | None) -> Prepared:
     block = replace(block, settings=settings)
     if block.crs != "local":
         block = transform_block(block, frame_of_block(block, geoid))
-    prepared = prepare(block)
+    prepared = without_contradicting_marks(prepare(block))
     if nothing_holds(prepared.system.unknowns, prepared.system.extras):
         raise failure(prepared.system, "rank deficient", f"the datum is free in {', '.join(FREEDOMS)}")
     return prepared

@@ -26,10 +26,10 @@ from aerotri.statistics.summarise import count_observations
 
 
 def without_contradicting_marks(prepared: Prepared) -> Prepared:
-    """The block without single marks that contradict, and a warning that names them."""
+    """The block without single marks that contradict, where it is robust, and a warning that names them."""
     u = prepared.system.unknowns
     block, rays = u.block, u.block.image_points
-    if not len(block.control):
+    if block.settings.adjustment.robust == "off" or not len(block.control):
         return prepared
     start = start_values_at(u, prepared.state)
     rows = rays_that_tell(block)

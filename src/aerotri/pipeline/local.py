@@ -100,13 +100,11 @@ class _Delivered:
 def adjust_local(block: Block, report: Report | None, given_points: np.ndarray | None) -> Adjustment:
     """Adjust a block in the local frame, stage by stage."""
     begun = time.perf_counter()
-    prepared = prepare(block, given_points)
+    prepared = without_contradicting_marks(prepare(block, given_points))
     started = time.perf_counter()
     _refuse_without_datum(prepared)
     settings = block.settings.adjustment
     options = SolveOptions(settings.max_iterations, settings.robust, report)
-    if settings.robust != "off":
-        prepared = without_contradicting_marks(prepared)
     stand = _Stand(*_determined(_tied(prepared, options)), block)
     stand = _without_gross_errors(stand, options)
     stand = _with_fields(stand, options)
