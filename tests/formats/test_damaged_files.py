@@ -27,6 +27,7 @@ from aerotri.formats.foreign.opensfm_gcp import read_opensfm_gcp
 from aerotri.formats.foreign.orientation_list import read_orientation_list, read_ortho_camera
 from aerotri.formats.foreign.patb import read_patb_con, read_patb_im, read_patb_ori
 from aerotri.formats.foreign.pix4d import read_pix4d_eo, read_pix4d_gcp, read_pix4d_geo, read_pix4d_offset
+from aerotri.formats.foreign.pix4d_params import read_pix4d_camera
 from formats.assembly.test_project import CAMERAS_TOML
 from formats.block.test_block_extras import CONSTRAINTS, EDITS, MARKS, PIXELS
 from formats.foreign.blocks_exchange_sample import BlocksExchange
@@ -37,6 +38,7 @@ from formats.foreign.test_opensfm import CONTENT, TRACKS
 from formats.foreign.test_opensfm_gcp import GCP as GCP_JSON
 from formats.foreign.test_orientation_lists import EO, NAMED, PLAIN, YAML, rows
 from formats.foreign.test_patb import CON, IM, ORI
+from formats.foreign.test_pix4d_params import CAM
 from formats.foreign.test_point_lists import GCP, GEO, NATIVE, ODM_GCP, ODM_GEO, POSITIONS_LIST
 
 QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
@@ -65,6 +67,7 @@ READERS = {
     "pix4d gcp": (read_pix4d_gcp, GCP),
     "pix4d geo": (read_pix4d_geo, GEO),
     "pix4d offset": (read_pix4d_offset, "1 2 3\n"),
+    "pix4d camera": (lambda path: read_pix4d_camera(path, 4.0), CAM),
     "plain": (read_orientation_list, PLAIN),
 }
 

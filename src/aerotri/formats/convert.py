@@ -39,6 +39,7 @@ from aerotri.formats.foreign.opensfm import is_opensfm, read_opensfm, write_open
 from aerotri.formats.foreign.opensfm_in_place import origin_of, update_opensfm
 from aerotri.formats.foreign.patb import write_patb
 from aerotri.formats.foreign.pix4d import write_pix4d_eo, write_pix4d_gcp, write_pix4d_geo
+from aerotri.formats.foreign.pix4d_params import is_pix4d_params, read_pix4d_params
 from aerotri.formats.text.notes import left_behind
 from aerotri.observations import Block
 
@@ -55,6 +56,7 @@ RECOGNISERS: Mapping[str, Callable[[Path], bool]] = {
     "bundler": is_bundler,
     "opensfm": is_opensfm,
     "metashape-project": is_metashape_project,
+    "pix4d-params": is_pix4d_params,
     "blocks-exchange": is_blocks_exchange,
 }
 
@@ -71,6 +73,7 @@ READERS: Mapping[str, Callable[[Path], tuple[Block, np.ndarray | None]]] = {
     "bundler": lambda path: _block_and_points(read_bundler(path)),
     "opensfm": lambda path: _block_and_points(read_opensfm(path)),
     "metashape-project": lambda path: _block_and_points(read_metashape_project(path)),
+    "pix4d-params": lambda path: _block_and_points(read_pix4d_params(path)),
     "blocks-exchange": lambda path: _block_and_points(read_blocks_exchange(path)),
 }
 OrientedWriter = Callable[[OrientedBlock, Path], tuple[str, ...]]

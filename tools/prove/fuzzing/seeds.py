@@ -87,7 +87,8 @@ def metashape_project(ending: str) -> dict[str, bytes]:
 def whole_files() -> list[tuple[str, str, bytes]]:
     """Format, file name and content of blocks that are one file."""
     bentley = of_tests("blocks_exchange_sample").BlocksExchange
-    return [("blocks-exchange", "site.xml", bentley(kind).text().encode()) for kind in ("local", "enu")]
+    found = [("blocks-exchange", "site.xml", bentley(kind).text().encode()) for kind in ("local", "enu")]
+    return [*found, ("pix4d-params", "x.txt", of_tests("test_pix4d_params").params().encode())]
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -12,6 +12,7 @@ from aerotri.formats.foreign.bingo import format_in_name
 from aerotri.formats.foreign.ign import is_ign_camera, read_ign_camera
 from aerotri.formats.foreign.metashape_camera import is_metashape_camera, read_metashape_camera
 from aerotri.formats.foreign.orientation_list import is_ortho_camera, read_ortho_camera
+from aerotri.formats.foreign.pix4d_params import is_pix4d_camera, read_pix4d_camera
 from aerotri.formats.text.notes import assumed, left_behind, taken
 from aerotri.observations import Camera, Prior
 
@@ -28,7 +29,7 @@ class CameraSpec:
 
     Parameters
     ----------
-    file : tables [camera.NAME] as in block.toml, a camera of IGN, a calibration of Metashape, or
+    file : tables [camera.NAME] as in block.toml, a camera of IGN, a calibration of Metashape, a .cam of Pix4D, or
         a camera of simple-ortho or orthority.
     name : '' where the files of image points name it.
     size_px : columns and rows; pixel_um; focal_length_mm : None where not stated.
@@ -123,7 +124,11 @@ def _from_file(path: Path, spec: CameraSpec) -> tuple[Camera, ...]:
         return read_cameras_toml(path)
     if is_ortho_camera(path):
         return (read_ortho_camera(path),)
-    for recognises, read in ((is_ign_camera, read_ign_camera), (is_metashape_camera, read_metashape_camera)):
+    for recognises, read in (
+        (is_ign_camera, read_ign_camera),
+        (is_metashape_camera, read_metashape_camera),
+        (is_pix4d_camera, read_pix4d_camera),
+    ):
         if recognises(path):
             if spec.pixel_um is None:
                 raise InputError("does not tell the size of a pixel", "state it: --pixel-um 4.0", path)
