@@ -6,8 +6,10 @@ import json
 import tempfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 from format_samples import FILM_TOML, SMALL, damaged
+from gnss_files import grafnav, mrk, rtklib
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
@@ -18,6 +20,8 @@ from aerotri.formats.block.settings import read_cameras_toml
 from aerotri.formats.foreign.bingo import is_bingo, read_bingo
 from aerotri.formats.foreign.blocks_exchange import read_blocks_exchange
 from aerotri.formats.foreign.bundler import is_bundler, read_bundler
+from aerotri.formats.foreign.dji_mrk import read_dji_mrk
+from aerotri.formats.foreign.grafnav import read_grafnav
 from aerotri.formats.foreign.ign import read_ign_app, read_ign_camera, read_ign_mes, read_ign_opk
 from aerotri.formats.foreign.metashape import read_metashape
 from aerotri.formats.foreign.named_lists import read_control_list, read_named_orientations, read_positions
@@ -28,6 +32,7 @@ from aerotri.formats.foreign.orientation_list import read_orientation_list, read
 from aerotri.formats.foreign.patb import read_patb_con, read_patb_im, read_patb_ori
 from aerotri.formats.foreign.pix4d import read_pix4d_eo, read_pix4d_gcp, read_pix4d_geo, read_pix4d_offset
 from aerotri.formats.foreign.pix4d_params import read_pix4d_camera
+from aerotri.formats.foreign.rtklib import read_rtklib
 from formats.assembly.test_project import CAMERAS_TOML
 from formats.block.test_block_extras import CONSTRAINTS, EDITS, MARKS, PIXELS
 from formats.foreign.blocks_exchange_sample import BlocksExchange
@@ -47,6 +52,8 @@ READERS = {
     "blocks exchange": (read_blocks_exchange, BlocksExchange("local").text()),
     "bundler": (read_bundler, BUNDLE),
     "cameras.toml": (read_cameras_toml, CAMERAS_TOML),
+    "dji mrk": (read_dji_mrk, mrk(np.arange(3.0))),
+    "grafnav": (read_grafnav, grafnav(np.arange(3.0), minutes=True)),
     "ign app": (read_ign_app, APP),
     "ign camera": (lambda path: read_ign_camera(path, 4.0), CAMERA),
     "ign mes": (read_ign_mes, MES),
@@ -68,6 +75,8 @@ READERS = {
     "pix4d geo": (read_pix4d_geo, GEO),
     "pix4d offset": (read_pix4d_offset, "1 2 3\n"),
     "pix4d camera": (lambda path: read_pix4d_camera(path, 4.0), CAM),
+    "rtklib": (read_rtklib, rtklib(np.arange(3.0), "enu")),
+    "rtklib in minutes": (read_rtklib, rtklib(np.arange(3.0), "dms", "UTC")),
     "plain": (read_orientation_list, PLAIN),
 }
 

@@ -87,12 +87,12 @@ def order_of_exposure(centre: np.ndarray, strips: np.ndarray, names: np.ndarray,
     if all(strips.tolist()):
         own = [np.flatnonzero(strips == strip) for strip in dict.fromkeys(strips.tolist())]
         return np.concatenate([rows[along_strip(centre[rows])] for rows in own])
-    by_name = np.array(sorted(range(len(names)), key=lambda k: _natural(str(names[k]))), dtype=np.int64)
+    by_name = np.array(sorted(range(len(names)), key=lambda k: natural_key(str(names[k]))), dtype=np.int64)
     orders = (np.arange(len(names)), by_name)
     return min(orders, key=lambda rows: float(np.linalg.norm(np.diff(centre[rows, :2], axis=0), axis=1).sum()))
 
 
-def _natural(name: str) -> list[tuple[int, int, str]]:
+def natural_key(name: str) -> list[tuple[int, int, str]]:
     """A name as a key to sort by, 'IMG_9' before 'IMG_10'."""
     return [(1, int(part), "") if part.isdecimal() else (0, 0, part) for part in re.split(r"(\d+)", name)]
 

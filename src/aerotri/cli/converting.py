@@ -41,6 +41,7 @@ from aerotri.cli.options import (
     StatedFocalLength,
     StatedPixelSize,
     SystemOfPhotographs,
+    TimeStampsOfFlight,
     Workers,
 )
 from aerotri.execution.choice import THREADS
@@ -76,7 +77,20 @@ def convert(
         typer.Option(help="More files of image points. May be repeated.", rich_help_panel=INPUT),
     ] = None,
     positions: Annotated[
-        str, typer.Option(help="List of observed positions of the photographs.", rich_help_panel=INPUT)
+        str,
+        typer.Option(
+            help="Observed positions of the photographs: a list, a trajectory (RTKLIB .pos, GrafNav), or time stamps "
+            "with the drone's own solution (.MRK).",
+            rich_help_panel=INPUT,
+        ),
+    ] = "",
+    time_stamps: Annotated[
+        str,
+        typer.Option(
+            help="When the photographs were taken, where --positions is a trajectory: .MRK of the drone, or a folder "
+            "of them.",
+            rich_help_panel=INPUT,
+        ),
     ] = "",
     control: Annotated[str, typer.Option(help="List of control points.", rich_help_panel=CONTROL)] = "",
     orientation: Annotated[
@@ -197,6 +211,7 @@ def convert(
         gnss_shift=gnss_shift,
         station_pattern=station_pattern,
         rig_reference=rig_reference,
+        time_stamps=time_stamps,
     )
     if parts is None:
         run_convert(request, form.needed(), to, json_, overwrite, in_place)
@@ -221,6 +236,7 @@ def tiepoints(
     gcp: MarkedControl = "",
     check: CheckPoints = None,
     positions: PhotographPositions = "",
+    time_stamps: TimeStampsOfFlight = "",
     orientation: Annotated[
         str,
         typer.Option(help="List of orientations; none is sought then.", rich_help_panel=INPUT),
@@ -293,6 +309,7 @@ def tiepoints(
         gcp=gcp,
         check=tuple(check or ()),
         positions=positions,
+        time_stamps=time_stamps,
         orientation=orientation,
         camera=CameraSpec(camera, "", None, pixel_um, focal_length_mm, None, free_interior),
         stated=stated,

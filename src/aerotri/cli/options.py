@@ -117,7 +117,21 @@ AnglesSigma = Annotated[
     ),
 ]  # fmt: skip
 PhotographPositions = Annotated[
-    str, typer.Option(help="List of positions of the photographs, in place of those in EXIF.", rich_help_panel=INPUT)
+    str,
+    typer.Option(
+        help="Positions of the photographs, in place of those in EXIF: a list, a trajectory (RTKLIB .pos, GrafNav), or "
+        "time stamps with the drone's own solution (.MRK).",
+        rich_help_panel=INPUT,
+    ),
+]
+TimeStampsOfFlight = Annotated[
+    str,
+    typer.Option(
+        "--time-stamps",
+        help="When the photographs were taken, where --positions is a trajectory: .MRK of the drone, or a folder of "
+        "them. Default: those beside the photographs.",
+        rich_help_panel=INPUT,
+    ),
 ]
 CameraFile = Annotated[
     Path | None,

@@ -40,6 +40,7 @@ class TiePointOptions:
     seed: int = DEFAULTS.seed
     executor: str = THREADS
     project: Path | None = None
+    time_stamps: str = ""
 
 
 def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bool, overwrite: bool = False) -> int:
@@ -59,6 +60,7 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
     with held(out):
         tied = tie_points(
             folder, control=o.gcp or None, check=o.check, positions=o.positions or None,
+            time_stamps=o.time_stamps or None,
             orientation=o.orientation or None, camera=o.camera.file, focal_length_mm=o.camera.focal_length_mm,
             pixel_um=o.camera.pixel_um, free_interior=o.camera.free, crs=stated.crs, geoid=stated.geoid,
             control_sigma_m=stated.control_sigma_m, control_prefix=stated.control_prefix,

@@ -142,6 +142,7 @@ def read(
     linear_alteration_m: float | None = None,
     station_pattern: str = "",
     rig_reference: str = "",
+    time_stamps: FilePath | None = None,
 ) -> ReadBlock:
     """A block from files of other programs; several files make one block.
 
@@ -152,7 +153,7 @@ def read(
         the kind cannot be told.
     name : of the block; that of the source where ''.
     image_points : more files of image points.
-    positions : observed positions of the photographs.
+    positions : observed positions of the photographs: a list, a trajectory (RTKLIB, GrafNav), or time stamps (.MRK).
     control : control points.
     orientation : start values of the orientations.
     check : names of control points that become check points.
@@ -185,6 +186,7 @@ def read(
     station_pattern : where exposure and camera of a rig stand in the names of the photographs, such as
         'IMG_{station}_{camera}.tif'; the block gets a rigid rig.
     rig_reference : its reference camera, as in the names; that with most photographs where ''.
+    time_stamps : when the photographs were taken, where `positions` is a trajectory: file .MRK, or a folder of them.
 
     Returns
     -------
@@ -229,6 +231,7 @@ def read(
             linear_alteration_m=linear_alteration_m,
             station_pattern=station_pattern,
             rig_reference=rig_reference,
+            time_stamps=time_stamps,
         )
     )
 
@@ -267,6 +270,7 @@ def request_of(
     linear_alteration_m: float | None = None,
     station_pattern: str = "",
     rig_reference: str = "",
+    time_stamps: FilePath | None = None,
 ) -> Request:
     """What `read` is asked for, in one record; arguments as there.
 
@@ -308,6 +312,7 @@ def request_of(
         gnss_shift=gnss_shift,
         station_pattern=station_pattern,
         rig_reference=rig_reference,
+        time_stamps=text_of_path(time_stamps),
     )
 
 

@@ -44,6 +44,7 @@ def run(
     axes: Axes | None = None,
     columns: str = "",
     positions: FilePath | None = None,
+    time_stamps: FilePath | None = None,
     camera: FilePath | None = None,
     focal_length_mm: float | None = None,
     pixel_um: float | None = None,
@@ -84,7 +85,9 @@ def run(
         them where None.
     columns : of such a list of control points (of positions where there are none): letters such as 'PNEZD', or names
         separated by commas.
-    positions : of the photographs, in place of EXIF.
+    positions : of the photographs, in place of EXIF; or a trajectory, or time stamps, see `aerotri.tie_points`.
+    time_stamps : when the photographs were taken, where `positions` is a trajectory: file .MRK of the drone, or a
+        folder of them; those beside the photographs where None.
     camera : file with the camera.
     focal_length_mm : in place of EXIF.
     pixel_um : size of a pixel, µm, in place of EXIF.
@@ -148,7 +151,8 @@ def run(
         "tie_points": {
             "control": control, "control_sigma_m": control_sigma_m, "control_prefix": control_prefix if marked else "",
             "axes": axes, "columns": columns,
-            "positions": positions, "camera": camera, "focal_length_mm": focal_length_mm, "pixel_um": pixel_um,
+            "positions": positions, "time_stamps": time_stamps, "camera": camera,
+            "focal_length_mm": focal_length_mm, "pixel_um": pixel_um,
             "crs": crs, "geoid": geoid, "seed": seed, "executor": elsewhere, "project": project,
             **({} if from_block else names),
         },

@@ -185,6 +185,7 @@ def tie_points(
     control_prefix: str = "",
     axes: Axes | None = None,
     columns: str = "",
+    time_stamps: FilePath | None = None,
     mark_sigma_px: float = DEFAULTS.mark_sigma_px,
     positions_sigma_m: Sigmas | None = None,
     orientation_sigma_m: Sigmas | None = None,
@@ -206,7 +207,8 @@ def tie_points(
     photographs : folder of photographs, JPEG or TIFF; subfolders too.
     control : control points with their image points, gcp_list.txt; PATH, or kind:PATH where the kind cannot be told.
     check : names of control points that become check points.
-    positions : of the photographs, in place of EXIF.
+    positions : of the photographs, in place of EXIF; or the trajectory of the antenna (RTKLIB, GrafNav), or time stamps
+        with the drone's own solution (.MRK).
     orientation : of the photographs; no first one is sought.
     camera : file with the camera.
     focal_length_mm : in place of EXIF.
@@ -220,6 +222,8 @@ def tie_points(
         them where None.
     columns : of such a list of control points (of positions where there are none): letters such as 'PNEZD', or names
         separated by commas.
+    time_stamps : when the photographs were taken, where `positions` is a trajectory: file .MRK of the drone, or a
+        folder of them; those beside the photographs where None.
     mark_sigma_px : σ of the image points of control, pixels.
     positions_sigma_m : σ of X, Y, Z, m, of positions without one.
     orientation_sigma_m : orientations are observations: σ of X, Y, Z, m.
@@ -257,7 +261,7 @@ def tie_points(
         "control": control, "check": check, "positions": positions, "orientation": orientation, "camera": camera,
         "focal_length_mm": focal_length_mm, "pixel_um": pixel_um, "free_interior": free_interior, "crs": crs,
         "geoid": geoid, "control_sigma_m": control_sigma_m, "control_prefix": control_prefix,
-        "axes": axes, "columns": columns,
+        "axes": axes, "columns": columns, "time_stamps": time_stamps,
         "mark_sigma_px": mark_sigma_px, "positions_sigma_m": positions_sigma_m,
         "orientation_sigma_m": orientation_sigma_m, "orientation_sigma_deg": orientation_sigma_deg, "points": points,
         "features": features, "feature_size": feature_size, "neighbours": neighbours, "seed": seed,
@@ -276,7 +280,10 @@ def tie_points(
         orientation_sigma_m=orientation_sigma_m, orientation_sigma_deg=orientation_sigma_deg,
         control_prefix=control_prefix, axes=axes, columns=columns,
     )  # fmt: skip
-    files = GivenFiles(text_of_path(control), tuple(check), text_of_path(positions), text_of_path(orientation), stated)
+    files = GivenFiles(
+        text_of_path(control), tuple(check), text_of_path(positions), text_of_path(orientation), stated,
+        text_of_path(time_stamps),
+    )  # fmt: skip
     spec = CameraSpec(camera, "", None, pixel_um, focal_length_mm, None, free_interior)
     found = FeatureOptions(features, feature_size)
     options = Options(found, MatchOptions(neighbours=neighbours, seed=seed), points)
@@ -307,7 +314,7 @@ def _tied(
     from aerotri.tie_points.stated import read_given, sources_of_photographs, stated_camera
 
     photographs = find_photographs(folder, stated_camera(camera))
-    given = read_given(files, mark_sigma_px)
+    given = read_given(files, mark_sigma_px, photographs)
     report.stage(compilation_notice() or "features of photographs", None)
     tied = tie_photographs(photographs, given, options, cache, report.counted, at)
     sources = sources_of_photographs(photographs, folder, files, camera.file)

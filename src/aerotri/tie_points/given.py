@@ -83,7 +83,7 @@ def positions_in(photographs: PhotographSet, given: Given, crs: str) -> tuple[Po
         about = f"positions of EXIF were left out for want of a coordinate system: {why}; state it with --crs"
         return None, (left_behind(about), *without)
     xyz = photographs.lon_lat_height[known]
-    flat = placing.to_crs(xyz, "EPSG:4326", plan_of(crs), None)
+    flat = placing.to_crs(xyz, placing.datum_of_base(xyz, placing.WGS84, plan_of(crs)), plan_of(crs), None)
     said = [*without]
     first = given.control or given.orientation
     if first is not None and not getattr(first, "crs", "") and not given.stated.crs:

@@ -60,6 +60,12 @@ class PhotographSet:
     def __len__(self) -> int:
         return len(self.paths)
 
+    @property
+    def folder(self) -> Path:
+        """The folder that the names begin in."""
+        depth = str(self.names[0]).count("/")
+        return self.paths[0].parents[depth]
+
     def in_order(self, rows: np.ndarray) -> PhotographSet:
         """The photographs in another order (n,), their cameras in the order in which these use them."""
         camera = self.camera[rows]

@@ -10,6 +10,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly import kinds
 from aerotri.formats.assembly.assemble import Statements
+from aerotri.formats.assembly.by_stamps import named_by_stamps
 from aerotri.formats.assembly.camera_spec import CameraSpec, cameras_of
 from aerotri.formats.assembly.imported import (
     CAMERA,
@@ -19,8 +20,9 @@ from aerotri.formats.assembly.imported import (
     POSITIONS,
     ImportSource,
     source_of_list,
+    sources_of_stamps,
 )
-from aerotri.formats.assembly.parts import PointList
+from aerotri.formats.assembly.parts import PointList, PositionList
 from aerotri.tie_points.given import Given
 from aerotri.tie_points.photographs import PhotographSet, StatedCamera
 
@@ -34,6 +36,7 @@ class GivenFiles:
     control : control points, with their image points where they were marked.
     check : names of those that are check points.
     positions : of the photographs, in place of EXIF. orientation : in place of a first orientation.
+    time_stamps : file or folder of time stamps, where `positions` is a trajectory; '' for those beside the photographs.
     """
 
     control: str = ""
@@ -41,6 +44,7 @@ class GivenFiles:
     positions: str = ""
     orientation: str = ""
     stated: Statements = field(default_factory=Statements)
+    time_stamps: str = ""
 
 
 def stated_camera(spec: CameraSpec) -> StatedCamera:
@@ -57,12 +61,13 @@ def stated_camera(spec: CameraSpec) -> StatedCamera:
     return StatedCamera(cameras_of(spec, (), nothing.astype(str), nothing))
 
 
-def read_given(files: GivenFiles, mark_sigma_px: float) -> Given:
+def read_given(files: GivenFiles, mark_sigma_px: float, photographs: PhotographSet | None = None) -> Given:
     """Read the files.
 
     Parameters
     ----------
     mark_sigma_px : σ of the image points of control.
+    photographs : which positions at time stamps are given to; None where there are no such.
 
     Raises
     ------
@@ -74,6 +79,8 @@ def read_given(files: GivenFiles, mark_sigma_px: float) -> Given:
         raise InputError("--check names control points, and there are none", "give them: --gcp gcp_list.txt")
     if stated.columns and not (files.control or files.positions):
         raise InputError("--columns is given, but no list of points", "give it: --gcp FILE, or --positions FILE")
+    if files.time_stamps and not files.positions:
+        raise InputError("--time-stamps is given, but no trajectory", "give it: --positions FILE")
     of_positions = reading.beside_control() if files.control else reading
     control = None
     if files.control:
@@ -81,7 +88,7 @@ def read_given(files: GivenFiles, mark_sigma_px: float) -> Given:
     return Given(
         # the names have the prefix already
         stated=replace(stated, control_prefix=""),
-        positions=kinds.read_position_list(files.positions, of_positions) if files.positions else None,
+        positions=_positions(files, of_positions, photographs) if files.positions else None,
         control=control,
         check=tuple(_in_block(name, control, stated.control_prefix) for name in files.check),
         orientation=kinds.read_orientations(files.orientation, reading) if files.orientation else None,
@@ -110,9 +117,20 @@ def sources_of_photographs(
     ):
         if text:
             found.append(source_of_list(text, known, holds, how))
+    found += sources_of_stamps(files.positions, files.time_stamps, photographs.folder)
     if camera is not None:
         found.append(ImportSource(str(camera), CAMERA))
     return tuple(found)
+
+
+def _positions(files: GivenFiles, reading: kinds.ReadingOptions, photographs: PhotographSet | None) -> PositionList:
+    """The positions of a file, under the names of the photographs."""
+    folder = None if photographs is None else photographs.folder
+    found = kinds.read_position_list(files.positions, reading, files.time_stamps, folder)
+    if photographs is None:
+        return found
+    time = np.full(len(photographs), np.nan) if photographs.time is None else photographs.time
+    return named_by_stamps(found, photographs.names, time)
 
 
 def _in_block(name: str, control: PointList | None, prefix: str) -> str:

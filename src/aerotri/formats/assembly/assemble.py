@@ -10,9 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.adjustment.track import exposure_times
 from aerotri.conventions import FilePath, InputError, counted, mm_from_px
 from aerotri.crs_text import refuse_other_system
 from aerotri.formats.assembly import placing
+from aerotri.formats.assembly.by_stamps import named_by_stamps
 from aerotri.formats.assembly.names_match import match_photographs
 from aerotri.formats.assembly.parts import OrientationList, PositionList, RayList, Reading, no_sigma
 from aerotri.formats.assembly.reprojection import settle
@@ -287,6 +289,7 @@ def with_positions(reading: Reading, given: PositionList, stated: Statements) ->
         raise InputError(
             "the block has observed positions already, from another file", "give one of the two files", given.path
         )
+    given = named_by_stamps(given, block.images.names, exposure_times(block))
     index, loosely = match_photographs(given.images, block.images.names)
     rows = np.flatnonzero(index >= 0)
     _refuse_strangers(given.images, index, block, given.path)
@@ -294,7 +297,11 @@ def with_positions(reading: Reading, given: PositionList, stated: Statements) ->
     messages = [*reading.messages, *given.messages, *said]
     image = index[rows]
     xyz = given.xyz[rows]
-    if given.crs:
+    if given.of_base:
+        refuse_local(block, given.crs, given.path)
+        xyz, said = placing.from_gnss(xyz, given, block.crs, stated.geoid)
+        messages += said
+    elif given.crs:
         refuse_local(block, given.crs, given.path)
         near = np.vstack([block.control.xyz, block.images.centre])
         xyz = placing.near_in_crs(xyz, given.crs, block.crs, stated.geoid, near, given.path)
@@ -306,7 +313,8 @@ def with_positions(reading: Reading, given: PositionList, stated: Statements) ->
     placing.refuse_far_off(xyz, block.images.centre, given.path, may_be_free=True)
     sigma = given_or_stated(given.sigma[rows], stated.positions_sigma_m, given.path, "--positions-sigma-m")
     unknown = no_sigma(len(rows))
-    observed = GnssIns(image, xyz, sigma, unknown, unknown, unknown[:, 0])
+    time = unknown[:, 0] if given.time is None else given.time[rows]
+    observed = GnssIns(image, xyz, sigma, unknown, unknown, time)
     images, said = _with_attitudes(block, image, xyz, given.yaw_pitch_roll[rows])
     return replace(reading, block=replace(block, gnss_ins=observed, images=images), messages=(*messages, *said))
 

@@ -25,7 +25,7 @@ SHOWN = 3
 WHOLE, RAYS, ORIENTATIONS, POSITIONS, CONTROL, CAMERA = (
     "block", "image points", "orientations", "positions", "control points", "camera",
 )  # fmt: skip
-PHOTOGRAPHS = "photographs"
+PHOTOGRAPHS, TIMES = "photographs", "time stamps"
 NOUNS = {
     "check_points": "check point", "gnss_positions": "GNSS position", "ins_attitudes": "INS attitude",
     "start_orientations": "start orientation",
@@ -34,7 +34,8 @@ PROGRAMS = {
     "block": "aerotri", "blocks": "ContextCapture, iTwin Capture",
     "colmap": "COLMAP", "dbat": "DBAT", "bal": "Bundle Adjustment in the Large",
     "bundler": "Bundler", "opensfm": "OpenSfM", "metashape": "Metashape", "pix4d": "Pix4D", "odm": "OpenDroneMap",
-    "ign": "IGN", "patb": "PAT-B", "bingo": "BINGO",
+    "ign": "IGN", "patb": "PAT-B", "bingo": "BINGO", "dji": "DJI", "rtklib": "RTKLIB, Emlid Studio",
+    "grafnav": "NovAtel GrafNav",
 }  # fmt: skip
 """The program behind a format, by the beginning of its name; none of lists that many write."""
 
@@ -178,6 +179,12 @@ def source_of_list(text: str, known: kinds.Kinds, holds: str, options: ReadingOp
     return ImportSource(str(path), holds, kind or "", program_of(kind))
 
 
+def sources_of_stamps(positions: str, time_stamps: str, photographs: Path | None = None) -> list[ImportSource]:
+    """The files of time stamps that a trajectory was read at; see `kinds.read_position_list`."""
+    paths = kinds.files_of_stamps(positions, time_stamps, photographs)
+    return [ImportSource(str(path), TIMES, kinds.DJI_MRK, program_of(kinds.DJI_MRK)) for path in paths]
+
+
 def sources_of(request: Request) -> tuple[ImportSource, ...]:
     """The files of a request that was read, in the order in which they are given.
 
@@ -198,6 +205,7 @@ def sources_of(request: Request) -> tuple[ImportSource, ...]:
     ):
         if text:
             found.append(source_of_list(text, known, holds, how))
+    found += sources_of_stamps(request.positions, request.time_stamps)
     if request.camera.file is not None:
         found.append(ImportSource(str(request.camera.file), CAMERA))
     return tuple(found)

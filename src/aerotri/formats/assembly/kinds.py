@@ -12,7 +12,12 @@ import numpy as np
 from aerotri.conventions import InputError, regular_file
 from aerotri.formats.assembly.assemble import Statements
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, RayList
+from aerotri.formats.assembly.stamped import events, positions_at, positions_of_stamps
+from aerotri.formats.assembly.timed import TimeStamps, Trajectory
+from aerotri.formats.files.photograph_files import files_of
 from aerotri.formats.foreign.bingo import is_bingo, read_bingo
+from aerotri.formats.foreign.dji_mrk import MRK, is_dji_mrk, read_dji_mrk
+from aerotri.formats.foreign.grafnav import is_grafnav, read_grafnav
 from aerotri.formats.foreign.ign import is_ign_app, is_ign_mes, is_ign_opk, read_ign_app, read_ign_mes, read_ign_opk
 from aerotri.formats.foreign.list_header import is_named_list, is_named_orientations, stated_columns
 from aerotri.formats.foreign.metashape import is_metashape, read_metashape
@@ -39,6 +44,7 @@ from aerotri.formats.foreign.pix4d import (
     read_pix4d_gcp,
     read_pix4d_geo,
 )
+from aerotri.formats.foreign.rtklib import is_rtklib, read_rtklib
 
 
 @dataclass(frozen=True)
@@ -89,7 +95,15 @@ ORIENTATIONS: Kinds = {
     "opk-list": (is_orientation_list, lambda path, _: read_orientation_list(path)),
     "opk-csv": (is_named_orientations, lambda path, _: read_named_orientations(path)),
 }
+TRAJECTORIES: Mapping[str, tuple[Callable[[Path], bool], Callable[[Path], Trajectory]]] = {
+    "rtklib": (is_rtklib, read_rtklib),
+    "grafnav": (lambda path: is_grafnav(path) and not is_named_list(path), read_grafnav),
+}
+DJI_MRK = "dji-mrk"
 POSITIONS: Kinds = {
+    DJI_MRK: (is_dji_mrk, lambda path, _: positions_of_stamps(read_dji_mrk(path))),
+    "rtklib": (TRAJECTORIES["rtklib"][0], lambda path, _: events(read_rtklib(path))),
+    "grafnav": (TRAJECTORIES["grafnav"][0], lambda path, _: events(read_grafnav(path))),
     "odm-geo": (is_odm_geo, lambda path, options: read_odm_geo(path, options.exchanged)),
     "csv": (is_named_list, lambda path, options: read_positions(path, options.columns, options.exchanged)),
     "pix4d-geo": (is_pix4d_geo, lambda path, options: read_pix4d_geo(path, options.axes)),
@@ -175,14 +189,63 @@ def read_orientations(text: str, options: ReadingOptions) -> OrientationList:
     return _read(text, ORIENTATIONS, "orientations", options)
 
 
-def read_position_list(text: str, options: ReadingOptions) -> PositionList:
+def read_position_list(
+    text: str, options: ReadingOptions, time_stamps: str = "", photographs: Path | None = None
+) -> PositionList:
     """Observed positions from ``PATH`` or ``kind:PATH``.
+
+    Parameters
+    ----------
+    time_stamps : file, or folder of files, with the times of photographs, where `text` is a trajectory; '' for those
+        that lie beside the photographs.
+    photographs : their folder, None where it is not known.
 
     Raises
     ------
     InputError
     """
-    return _read(text, POSITIONS, "positions", options)
+    kind, path = _trajectory(text)
+    if kind is None:
+        if time_stamps:
+            message = "is no trajectory, so that --time-stamps says nothing of it"
+            raise InputError(message, f"leave it out; trajectories are {', '.join(TRAJECTORIES)}", path)
+        return _read(text, POSITIONS, "positions", options)
+    files = files_of_stamps(text, time_stamps, photographs)
+    if not files:
+        return _read(text, POSITIONS, "positions", options)
+    return positions_at(TRAJECTORIES[kind][1](path), [_time_stamps(file) for file in files])
+
+
+def _trajectory(text: str) -> tuple[str | None, Path]:
+    """The kind of a trajectory, None of another file, and its path."""
+    stated, path = split_kind(text, POSITIONS)
+    told = stated or next((name for name, (recognises, _) in TRAJECTORIES.items() if recognises(path)), None)
+    return (told if told in TRAJECTORIES and not path.is_dir() else None), path
+
+
+def files_of_stamps(text: str, time_stamps: str, photographs: Path | None = None) -> list[Path]:
+    """The files of time stamps for positions; none where these are no trajectory. Arguments as `read_position_list`.
+
+    Raises
+    ------
+    InputError
+        When the folder that is stated has none.
+    """
+    if not text or _trajectory(text)[0] is None:
+        return []
+    if not time_stamps:
+        return [] if photographs is None else list(files_of(photographs, (MRK,)))
+    path = Path(time_stamps)
+    found = list(files_of(path, (MRK,))) if path.is_dir() else [path]
+    if not found:
+        raise InputError(f"holds no file {MRK.upper()}", "give the file of time stamps", path)
+    return found
+
+
+def _time_stamps(path: Path) -> TimeStamps:
+    if not is_dji_mrk(regular_file(path)):
+        raise InputError("is no file of time stamps", "give the .MRK that the drone wrote beside the photographs", path)
+    return read_dji_mrk(path)
 
 
 def read_control(text: str, options: ReadingOptions) -> PointList:

@@ -70,19 +70,39 @@ class OrientationList:
 
 
 @dataclass(frozen=True, eq=False)
+class Stamps:
+    """What rows of a list have in place of names: which photographs they mean is settled when these are known.
+
+    Parameters
+    ----------
+    file : (n,) index into `files`, that the time stamp is from. files : the files.
+    number : (n,) of the photograph, −1 where there is none.
+    refused : (n,) str, why there is no position at this time, '' where there is one.
+    """
+
+    file: np.ndarray
+    files: tuple[Path, ...]
+    number: np.ndarray
+    refused: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class PositionList:
     """Observed positions of photographs.
 
     Parameters
     ----------
     path : the file.
-    images : (n,) str.
+    images : (n,) str; of `stamps` names of these.
     xyz, sigma : (n, 3) m, NaN where not given.
     yaw_pitch_roll : (n, 3) rad, NaN where not given: yaw clockwise from true north to the top of the image, pitch and
         roll 0 for a photograph that looks straight down.
     crs : coordinate system where the file names it, else ''.
     messages : what the user should know.
-    heights : 'ellipsoidal' where the file calls them so, else ''.
+    heights : 'ellipsoidal' or 'sea level' where the file calls them so, else ''.
+    time : (n,) s, None where the file has none.
+    stamps : which photographs the rows mean, where they have no names.
+    of_base : whether longitude and latitude are on the datum of the base station, which files call WGS 84.
     """
 
     path: Path
@@ -93,6 +113,9 @@ class PositionList:
     crs: str = ""
     messages: tuple[str, ...] = ()
     heights: str = ""
+    time: np.ndarray | None = None
+    stamps: Stamps | None = None
+    of_base: bool = False
 
 
 @dataclass(frozen=True, eq=False)

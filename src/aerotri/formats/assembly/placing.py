@@ -11,6 +11,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates import local_frame
 from aerotri.coordinates.blocks import frame_of_block, transform_block
+from aerotri.coordinates.ellipsoid import metres_of_units
 from aerotri.coordinates.georeference import (
     CRS_PATTERN,
     CRS_REMEDY,
@@ -20,10 +21,12 @@ from aerotri.coordinates.georeference import (
     utm_on_datum,
 )
 from aerotri.coordinates.local_frame import LocalFrame, topocentric_frame
+from aerotri.coordinates.stated_systems import geographic_of
 from aerotri.crs_text import plan_of, system_in_words
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import PointList, PositionList, Reading
 from aerotri.formats.foreign.ign import without_linear_alteration
+from aerotri.formats.text.notes import assumed, taken
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 
 NORTH_STEP_DEG = 1e-5
@@ -35,6 +38,10 @@ FAR_M, FAR_SIZES = 1e4, 3.0
 system; chosen [C]: below the differences of X and Y in most systems, beyond the way from a block to its control."""
 HIGHEST_GROUND_M, HIGHEST_FLIGHT_M = 9e3, 3e4
 """Heights beyond these are none of ground and of an aircraft [C]."""
+WGS84 = "EPSG:4326"
+SAME_FRAME_M = 3.0
+"""Distance between WGS 84 and another datum up to which GNSS works in either, by its base [C]: plates have moved ETRS89
+and NAD83 by less, datums of older surveys are off by tens of metres and more."""
 OTHER_SYSTEM = "are both in the same coordinate system? correct the one that the list names, or state it: --crs"
 OTHER_AXES = "state the order of the axes: --axes yx (or xy)"
 NEARER = 0.1
@@ -114,6 +121,63 @@ def to_crs(xyz: np.ndarray, source: str, target: str, geoid: FilePath | None) ->
 def _datum(reference: Georeference) -> str:
     target = reference.horizontal.target_crs
     return "" if target is None or target.datum is None else target.datum.name.replace(" ensemble", "")
+
+
+def from_gnss(
+    place: np.ndarray, given: PositionList, crs: str, geoid: FilePath | None
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Positions of GNSS in the CRS of a block, and what to say of their datum and heights.
+
+    Parameters
+    ----------
+    place : (n, 3) longitude, latitude, degrees, and height of `given`.
+
+    Raises
+    ------
+    InputError
+        When the CRS is on a datum that coordinates of GNSS have to be transformed to.
+    """
+    name, wanted = given.path.name, crs
+    if given.heights == "sea level":
+        wanted = plan_of(crs)
+        said = assumed(f"heights of {name} count from sea level; they are taken as those of {crs} as they are")
+    elif wanted != plan_of(crs):
+        said = taken(f"heights of {name} count from the ellipsoid, and were brought to those of {crs}")
+    else:
+        said = assumed(
+            f"heights of {name} count from the ellipsoid, and {crs} names no system of heights: those of control "
+            f"points have to count from the ellipsoid too; where they do not, state their system: --crs {crs}+…"
+        )
+    source = datum_of_base(place, given.crs, plan_of(crs))
+    of_datum = assumed(f"{name}: WGS 84 is taken as the datum of {crs}, as that of its base station")
+    messages = (said,) if source == given.crs else (said, of_datum)
+    try:
+        return to_crs(place, source, wanted, geoid), messages
+    except InputError as error:
+        raise InputError(error.message, error.remedy, given.path) from error
+
+
+def datum_of_base(place: np.ndarray, source: str, plan: str) -> str:
+    """The longitude and latitude on the datum of a block, where this is one that GNSS works in, else `source`.
+
+    What receivers call WGS 84 is the frame of the coordinates of their base station, such as ETRS89 or NAD83(2011).
+
+    Parameters
+    ----------
+    place : (n, 3) longitude, latitude and height in `source`. plan : CRS of the block.
+    """
+    from pyproj import Transformer
+    from pyproj.exceptions import ProjError
+
+    target = geographic_of(plan)
+    if source != WGS84 or target == source or not len(place):
+        return source
+    try:
+        found = np.array(Transformer.from_crs(source, target, always_xy=True).transform(*place[:1, :2].T))[:, 0]
+    except ProjError:
+        return source
+    apart = np.linalg.norm((found - place[0, :2]) * metres_of_units(place[:1])[0, :2])
+    return target if apart < SAME_FRAME_M else source
 
 
 def from_ellipsoidal_heights(xyz: np.ndarray, crs: str, geoid: FilePath | None) -> np.ndarray:

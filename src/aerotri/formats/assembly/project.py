@@ -71,6 +71,7 @@ class Request:
     offset : file with what is added to orientations of Pix4D.
     image_sigma_um, image_sigma_px : standard deviation of the image points; None: that of the source, or a pixel.
     gnss_shift : 'off', 'block' or 'strip'; None: as the settings are.
+    time_stamps : file of time stamps, or a folder of them, where `positions` is a trajectory.
     station_pattern, rig_reference : see `rigs_by_name.with_rig`; '' for no rig.
     """
 
@@ -89,6 +90,7 @@ class Request:
     gnss_shift: str | None = None
     station_pattern: str = ""
     rig_reference: str = ""
+    time_stamps: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +174,7 @@ def _positions(request: Request, options: ReadingOptions, parts: _Parts) -> Posi
     if not request.positions:
         return parts.positions
     own = options.beside_control() if request.control else options
-    return kinds.read_position_list(request.positions, own)
+    return kinds.read_position_list(request.positions, own, request.time_stamps)
 
 
 def _on_rig(reading: Reading, request: Request) -> Reading:
@@ -195,6 +197,8 @@ def reading_options(request: Request) -> ReadingOptions:
         raise InputError("--rig-reference is given, but no rig", "say how names tell it: --station-pattern PATTERN")
     if request.stated.columns and not (request.control or request.positions):
         raise InputError("--columns is given, but no list of points", "give it: --control FILE, or --positions FILE")
+    if request.time_stamps and not request.positions:
+        raise InputError("--time-stamps is given, but no trajectory", "give it: --positions FILE")
     if not request.control and request.stated.control_prefix:
         raise InputError("--control-prefix is given, but no control points", "give them: --control FILE")
     return kinds.options_of(request.stated, offset)
