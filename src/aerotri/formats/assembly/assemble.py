@@ -19,6 +19,7 @@ from aerotri.formats.assembly.names_match import match_photographs
 from aerotri.formats.assembly.parts import OrientationList, PositionList, RayList, Reading, no_sigma
 from aerotri.formats.assembly.reprojection import settle
 from aerotri.formats.text.notes import assumed, left_behind, taken
+from aerotri.formats.text.sigmas import refuse_stated
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.observations import Block, Camera, GnssIns, ImagePoints, Images
 from aerotri.observations.names import in_words
@@ -60,6 +61,11 @@ class Statements:
     patb_rotation: str | None = None
     axes: str | None = None
     columns: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("control_sigma_m", "positions_sigma_m", "orientation_sigma_m"):
+            option = f"--{name.replace('_', '-')}"
+            refuse_stated(getattr(self, name), option, may_be_zero=name == "control_sigma_m")
 
 
 def with_crs(reading: Reading, crs: str, geoid: FilePath | None = None) -> Reading:

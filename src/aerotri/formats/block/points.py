@@ -187,6 +187,7 @@ def read_control(path: Path | None, measured: pa.StringArray, settings: BlockTom
         np.full(3, np.nan) if default is None else np.array(default, dtype=float),
         "give it in the table, or default_control_sigma_m under [stochastic] in block.toml",
         may_be_zero=True,
+        on_ground=True,
     )
     point, names = _with_points_never_measured(table.text["point"], measured)
     return Control(point, xyz, sigma, _is_check(table)), names
@@ -243,7 +244,7 @@ def read_gnss_ins(path: Path | None, images: Images, radians: float) -> GnssIns 
     return GnssIns(
         image=image,
         xyz=xyz,
-        sigma=sigma_columns(table, ("sX", "sY", "sZ"), ~np.isnan(xyz), unknown, remedy),
+        sigma=sigma_columns(table, ("sX", "sY", "sZ"), ~np.isnan(xyz), unknown, remedy, on_ground=True),
         angles=angles * radians,
         angles_sigma=sigma_columns(table, ("s_omega", "s_phi", "s_kappa"), ~np.isnan(angles), unknown, remedy)
         * radians,

@@ -20,7 +20,7 @@ from aerotri.formats.block.settings_types import (
     Positive,
     Section,
     Three,
-    ThreeNotNegative,
+    ThreeGroundSigmas,
     ThreePositive,
     ThreePriorsModel,
 )
@@ -46,7 +46,7 @@ class StochasticModel(Section):
         None, "Distance in the photograph after which the correlation of this error has fallen to 37 %; estimated from "
         "the block where it is not given.", "mm"
     )  # fmt: skip
-    default_control_sigma_m: ThreeNotNegative | None = key(
+    default_control_sigma_m: ThreeGroundSigmas | None = key(
         None, "Standard deviation of X, Y, Z of control and check points where control.csv gives none; 0 holds the "
         "coordinate without error.", "m"
     )  # fmt: skip

@@ -5,12 +5,21 @@ from __future__ import annotations
 from math import radians
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from aerotri.conventions import LARGEST
 from aerotri.formats.text.described_key import key
+from aerotri.formats.text.sigmas import impossible_sigmas, why_impossible
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.observations import Prior, RollingShutter
+
+
+def _ground_sigma(value: float) -> float:
+    if impossible_sigmas(np.array(value), may_be_zero=True):
+        raise ValueError(f"a standard deviation {why_impossible(value, may_be_zero=True)}")
+    return value
+
 
 Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(gt=0, ge=SMALLEST_POSITIVE, le=LARGEST)]
@@ -19,7 +28,9 @@ Fraction = Annotated[float, Field(gt=0, lt=1)]
 Pixels = Annotated[int, Field(gt=0, le=10_000_000)]
 Two = Annotated[list[Real], Field(min_length=2, max_length=2)]
 Three = Annotated[list[Real], Field(min_length=3, max_length=3)]
-ThreeNotNegative = Annotated[list[NotNegative], Field(min_length=3, max_length=3)]
+GroundSigma = Annotated[float, Field(ge=0, le=LARGEST), AfterValidator(_ground_sigma)]
+"""m; 0 stands for a coordinate without error."""
+ThreeGroundSigmas = Annotated[list[GroundSigma], Field(min_length=3, max_length=3)]
 ThreePositive = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 OffOn = Literal["off", "on"]
 

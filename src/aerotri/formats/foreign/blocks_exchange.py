@@ -29,7 +29,7 @@ from aerotri.formats.foreign.colmap_rigs import COLMAP_FROM_CAMERA
 from aerotri.formats.foreign.reconstruction import Reconstruction, check_names, names_of_paths
 from aerotri.formats.foreign.world_systems import WorldSystem, coordinates_in, placed, target_of
 from aerotri.formats.text.notes import assumed, left_behind, taken
-from aerotri.formats.text.tables import SMALLEST_POSITIVE
+from aerotri.formats.text.sigmas import impossible_sigmas, why_impossible
 from aerotri.formats.text.text_lines import first_lines
 from aerotri.formats.text.xml_text import read_xml
 from aerotri.observations import Block, Control, GnssIns
@@ -214,10 +214,9 @@ def _accuracy(place: XmlPlace, xyz: list[float]) -> list[float]:
     """σ of the coordinates that are known, NaN where the file does not tell."""
     plan, height = (place.number(key, -1.0) for key in ("HorizontalAccuracy", "VerticalAccuracy"))
     found = [plan, plan, height]
-    if any(
-        place.has(key) and place.number(key) < SMALLEST_POSITIVE for key in ("HorizontalAccuracy", "VerticalAccuracy")
-    ):
-        raise place.error("an accuracy is not greater than 0", "give the point an accuracy")
+    for key in ("HorizontalAccuracy", "VerticalAccuracy"):
+        if place.has(key) and impossible_sigmas(np.array(place.number(key))):
+            raise place.error(f"{key} {why_impossible(place.number(key))}", "give the point an accuracy, in metres")
     return [np.nan if value < 0.0 or np.isnan(xyz[k]) else value for k, value in enumerate(found)]
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.formats.foreign.reconstruction import PixelCamera, rotation_matrix
 from aerotri.formats.foreign.world_systems import WorldSystem, world_system
+from aerotri.formats.text.sigmas import impossible_sigmas, why_impossible
 from aerotri.formats.text.tables import LARGEST_NUMBER, SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import is_number
 from aerotri.formats.text.xml_text import text_of
@@ -327,8 +328,9 @@ def _sigma(place: XmlPlace) -> np.ndarray:
     for owner in (place, place.child("Center")):
         if owner is not None and owner.has("HorizontalAccuracy"):
             plan, height = owner.number("HorizontalAccuracy"), owner.number("VerticalAccuracy", np.nan)
-            if min(plan, height) < SMALLEST_POSITIVE:
-                raise owner.error("an accuracy is not greater than 0")
+            for value in (plan, height):
+                if impossible_sigmas(np.array(value)):
+                    raise owner.error(f"an accuracy {why_impossible(value)}")
             return np.array([plan, plan, plan if np.isnan(height) else height])
     return np.full(3, np.nan)
 

@@ -252,7 +252,7 @@ def _control_sigma(table: Table, keep: np.ndarray) -> np.ndarray:
     values = Table(table.path, table.length, {}, numbers, table.source)
     wanted = np.repeat(keep[:, None], 3, axis=1)
     # a coordinate without standard deviation is free of error to DBAT
-    return sigma_columns(values, ("sx", "sy", "sz"), wanted, np.zeros(3), "", may_be_zero=True)[keep]
+    return sigma_columns(values, ("sx", "sy", "sz"), wanted, np.zeros(3), "", True, on_ground=True)[keep]
 
 
 def _adjustment(
@@ -318,6 +318,7 @@ def _positions(path: Path, images: Images) -> GnssIns:
     image = _rows_of(table, "label", images.names.tolist(), "image")
     refuse_duplicates(table, image, lambda row: f"image '{table.cell('label', row)}'")
     xyz = table.stack("X", "Y", "Z")
-    sigma = sigma_columns(table, ("accuracy",), np.ones((table.length, 1), bool), np.full(1, np.nan), "give it in m")
+    everywhere = np.ones((table.length, 1), bool)
+    sigma = sigma_columns(table, ("accuracy",), everywhere, np.full(1, np.nan), "give it in m", on_ground=True)
     unknown = np.full_like(xyz, np.nan)
     return GnssIns(image, xyz, np.repeat(sigma, 3, axis=1), unknown, unknown, unknown[:, 0])

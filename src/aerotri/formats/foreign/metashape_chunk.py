@@ -20,6 +20,8 @@ from aerotri.conventions import InputError
 from aerotri.formats.foreign.metashape_camera import NOT_EXPRESSED, PROJECTIONS, RADIAL
 from aerotri.formats.foreign.metashape_files import REMEDY
 from aerotri.formats.foreign.reconstruction import rotation_matrix
+from aerotri.formats.text.sigmas import REMEDY as REMEDY_OF_SIGMA
+from aerotri.formats.text.sigmas import impossible_sigmas, why_impossible
 from aerotri.formats.text.tables import (
     CONTROL_CHARACTERS,
     LARGEST_FORMAT_PX,
@@ -333,5 +335,7 @@ def place_of(reference: Element, default: float, path: Path) -> tuple[list[float
     for own, common in (("sx", ("sxy", "sxyz")), ("sy", ("sxy", "sxyz")), ("sz", ("sxyz",))):
         text = next((reference.get(key) for key in (own, *common) if reference.get(key)), None)
         value = default if text is None else number(text, own, path)
-        sigma.append(value if value >= SMALLEST_POSITIVE else default)
+        if value > 0.0 and impossible_sigmas(np.array(value)):
+            raise InputError(f"{own} of a reference {why_impossible(value)}", REMEDY_OF_SIGMA, path)
+        sigma.append(value if value > 0.0 else default)
     return xyz, sigma

@@ -29,7 +29,7 @@ from aerotri.formats.foreign.list_systems import (
 )
 from aerotri.formats.text.list_columns import IN_DEGREES, ListColumn
 from aerotri.formats.text.notes import assumed, left_behind, taken
-from aerotri.formats.text.tables import SMALLEST_POSITIVE
+from aerotri.formats.text.sigmas import REMEDY, impossible_sigmas, why_impossible
 from aerotri.formats.text.text_lines import TextFile
 from aerotri.functional_model.rotation import rotation_from_angles
 
@@ -189,10 +189,11 @@ def _sigma(found: _List, may_be_zero: bool = False) -> tuple[np.ndarray, tuple[s
         sigma = found.numbers("sX", "sY", "sZ")
         for fallback in (found.numbers("s_plan", "s_plan", "s_height"), found.numbers("s_all", "s_all", "s_all")):
             sigma = np.where(np.isnan(sigma), fallback, sigma)
-    bad = np.flatnonzero(((sigma < SMALLEST_POSITIVE) & ~((sigma == 0.0) & may_be_zero)).any(axis=1))
+    bad = np.argwhere(impossible_sigmas(sigma, may_be_zero))
     if len(bad):
-        size = "negative" if may_be_zero else "not greater than 0"
-        raise found.file.error(found.rows[bad[0]], f"a standard deviation is {size}", "give a small one, in m")
+        row, k = bad[0].tolist()
+        why = why_impossible(float(sigma[row, k]), may_be_zero)
+        raise found.file.error(found.rows[row], f"a standard deviation {why}", REMEDY)
     return sigma, said
 
 

@@ -21,7 +21,7 @@ from aerotri.formats.assembly.parts import PointList, PositionList, RayList, no_
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.foreign.list_systems import in_words, order_of_axes, refuse_unknown_heights
 from aerotri.formats.text.notes import assumed, left_behind
-from aerotri.formats.text.tables import SMALLEST_POSITIVE
+from aerotri.formats.text.sigmas import REMEDY, impossible_sigmas, why_impossible
 from aerotri.formats.text.text_lines import TextFile, check_words, first_lines, is_number
 from aerotri.observations import Block
 from aerotri.observations.names import ENDING
@@ -218,9 +218,10 @@ def read_odm_geo(path: FilePath, exchanged: bool = False) -> PositionList:
         raise file.error(rows[bad], "the plan position is missing", f"rows are: {form}")
     refuse_unknown_heights(file, system, values[:, 2])
     accuracy = values[:, 6:8]
-    bad = np.flatnonzero((accuracy < SMALLEST_POSITIVE).any(axis=1))
+    bad = np.argwhere(impossible_sigmas(accuracy))
     if len(bad):
-        raise file.error(rows[int(bad[0])], "an accuracy is not greater than 0", "give a small one, in metres")
+        row, k = bad[0].tolist()
+        raise file.error(rows[row], f"an accuracy {why_impossible(float(accuracy[row, k]))}", REMEDY)
     angles = np.radians(values[:, 3:6])
     angles[np.isnan(angles).any(axis=1)] = np.nan
     there = ~np.isnan(values[:, 2])

@@ -29,7 +29,7 @@ from aerotri.formats.foreign.opensfm_rigs import RigShots, rig_shots, rigs_of, s
 from aerotri.formats.foreign.opensfm_tracks import HEADER, TRACKS, Tracks, read_tracks, track_line
 from aerotri.formats.results.json_text import json_text
 from aerotri.formats.text.notes import assumed, left_behind, taken
-from aerotri.formats.text.tables import SMALLEST_POSITIVE
+from aerotri.formats.text.sigmas import impossible_sigmas, why_impossible
 from aerotri.functional_model.rotation import angles_from_rotation, exponential, logarithm
 from aerotri.observations import (
     AdjustmentSettings,
@@ -212,11 +212,11 @@ def _observed(chosen: Node, shots: dict[str, Node]) -> tuple[GnssIns | None, lis
     for row, node in enumerate(shots.values()):
         if node.has("gps_position") and node.has("gps_dop"):
             dop = node.get("gps_dop").number()
-            if dop < SMALLEST_POSITIVE:
-                raise node.error("gps_dop is not greater than 0")
             if dop >= NO_POSITION:
                 unknown_places += 1
                 continue
+            if impossible_sigmas(np.array(dop)):
+                raise node.error(f"gps_dop {why_impossible(dop)}")
             rows.append(row)
             xyz.append(node.get("gps_position").numbers(3))
             sigma.append([dop] * 3)

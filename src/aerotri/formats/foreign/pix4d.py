@@ -21,7 +21,7 @@ from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.foreign.list_header import is_named
 from aerotri.formats.foreign.list_systems import order_of_axes, refuse_unknown_heights, system_above
 from aerotri.formats.text.notes import assumed
-from aerotri.formats.text.tables import SMALLEST_POSITIVE
+from aerotri.formats.text.sigmas import REMEDY, impossible_sigmas, why_impossible
 from aerotri.formats.text.text_lines import TextFile, all_numbers, check_words, first_lines
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Block
@@ -185,10 +185,10 @@ def _spread(file: TextFile, accuracy: np.ndarray, may_be_zero: bool = False) -> 
     """(n, 3) σ of horizontal and vertical accuracies, of one for both, or of none."""
     if not accuracy.shape[1]:
         return no_sigma(len(accuracy))
-    bad = np.flatnonzero(((accuracy < SMALLEST_POSITIVE) & ~((accuracy == 0.0) & may_be_zero)).any(axis=1))
+    bad = np.argwhere(impossible_sigmas(accuracy, may_be_zero))
     if len(bad):
-        size = "negative" if may_be_zero else "not greater than 0"
-        raise file.error(int(bad[0]), f"an accuracy is {size}", "give a small one, in metres")
+        row, k = bad[0].tolist()
+        raise file.error(row, f"an accuracy {why_impossible(float(accuracy[row, k]), may_be_zero)}", REMEDY)
     return accuracy[:, [0, 0, -1]]
 
 

@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.formats.text.sigmas import REMEDY as SIGMA_REMEDY
+from aerotri.formats.text.sigmas import impossible_sigmas, why_impossible
 from aerotri.formats.text.tables import SMALLEST_POSITIVE, Table
 from aerotri.observations import Images
 from aerotri.observations.names import SHOWN_NEAR, near_names
@@ -63,7 +65,7 @@ def three_or_none(table: Table, columns: tuple[str, str, str]) -> np.ndarray:
 
 def sigma_columns(
     table: Table, columns: tuple[str, ...], wanted: np.ndarray, default: np.ndarray, remedy: str,
-    may_be_zero: bool = False,
+    may_be_zero: bool = False, on_ground: bool = False,
 ) -> np.ndarray:  # fmt: skip
     """(n, k) standard deviations, by default where the table gives none, NaN where no value is wanted.
 
@@ -74,6 +76,7 @@ def sigma_columns(
     default : (k,), NaN where there is no default.
     remedy : what to do where a standard deviation is missing.
     may_be_zero : 0 stands for a value without error.
+    on_ground : they are of coordinates on the ground, m, which have bounds of their own.
 
     Raises
     ------
@@ -81,6 +84,11 @@ def sigma_columns(
         For a standard deviation that is not positive, or missing without a default.
     """
     given = table.stack(*columns)
+    if on_ground:
+        absurd = np.argwhere(impossible_sigmas(given) & (given > 0.0))
+        if len(absurd):
+            row, k = absurd[0].tolist()
+            raise table.error(row, f"{columns[k]} {why_impossible(float(given[row, k]))}", SIGMA_REMEDY)
     for k, column in enumerate(columns):
         bad = np.flatnonzero((given[:, k] < SMALLEST_POSITIVE) & ~((given[:, k] == 0.0) & may_be_zero))
         if len(bad):
