@@ -19,9 +19,10 @@ from small_blocks import small_block, with_adjustment
 WHITE = {"sigma_m": [0.03, 0.03, 0.05]}
 
 
-def block_with_gnss(seed=3, change=None, shift="off"):
+def block_with_gnss(seed=3, change=None, shift="off", **navigation):
     """A faultless block with GNSS, its control changed by `change(xyz from the middle)`."""
-    block = with_adjustment(small_block(seed, gnss=WHITE, **TINY)[0], additional_parameters=parse_parameters("none"))
+    block = small_block(seed, gnss=WHITE, **navigation, **TINY)[0]
+    block = with_adjustment(block, additional_parameters=parse_parameters("none"))
     block = replace(block, settings=replace(block.settings, gnss=replace(block.settings.gnss, shift=shift)))
     if change is None:
         return block
@@ -51,6 +52,15 @@ def test_a_contradiction_is_said(change, words, shift):
     result = aerotri.adjust(block_with_gnss(change=change, shift=shift))
     assert result.verdict != "accepted"
     assert any(words in reason for reason in result.reasons)
+
+
+@pytest.mark.parametrize(("change", "words"), [(tilted, "tilted by"), (turned, "turned in plan")])
+def test_control_against_positions_and_attitudes(change, words):
+    """Neither of the two is turned against the other."""
+    ins = {"sigma_deg": [0.005, 0.005, 0.01]}
+    reasons = aerotri.adjust(block_with_gnss(change=change, ins=ins)).reasons
+    assert any("contradict GNSS and INS: the positions and attitudes are" in text and words in text for text in reasons)
+    assert not adjust_keeping_system(block_with_gnss(ins=ins)).local.common_motion.counts
 
 
 def test_its_size():

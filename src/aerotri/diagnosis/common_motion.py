@@ -39,17 +39,19 @@ def common_motion_in_words(found: CommonMotion | None, chance: float = CHANCE) -
     """What contradicts what, a sentence each; none where chance explains it with this probability or more."""
     if found is None:
         return []
-    said = []
+    said, contradict, what = [], "control points and GNSS contradict each other", "GNSS positions"
+    if found.with_attitudes:
+        contradict, what = "control points contradict GNSS and INS", "positions and attitudes"
     if found.p_tilt < chance:
         said.append(
-            "control points and GNSS contradict each other: the GNSS positions are tilted by "
+            f"{contradict}: the {what} are tilted by "
             f"{found.tilt_m[0]:.3f} m (σ {found.tilt_m[1]:.3f}) in height "
             f"over the length of the block ({_chance(found.p_tilt)}). Possible causes: {CAUSES_OF_TILT}"
         )
     if found.p_turn < chance:
         across = abs(float(found.turn[2])) * float(np.hypot(*found.extent[:2]))
         said.append(
-            f"control points and GNSS contradict each other: the GNSS positions are turned in plan by {across:.3f} m "
+            f"{contradict}: the {what} are turned in plan by {across:.3f} m "
             f"over the length of the block ({_chance(found.p_turn)}). Possible causes: {CAUSES_OF_TURN}"
         )
     if found.p_scale < chance:

@@ -25,7 +25,7 @@ class CommonMotion:
     ----------
     turn, turn_sigma : (3,) rad, about X, Y and Z. scale, scale_sigma : observed − adjusted, relative.
     p_tilt, p_turn, p_scale : probability of as much by chance, of the tilt about X and Y, the turn about Z, the scale.
-    extent : (3,) m, of the positions.
+    extent : (3,) m, of the positions. with_attitudes : whether the observed attitudes are turned alike.
     """
 
     turn: np.ndarray
@@ -36,11 +36,17 @@ class CommonMotion:
     p_turn: float
     p_scale: float
     extent: np.ndarray
+    with_attitudes: bool = False
+
+    @property
+    def least_chance(self) -> float:
+        """The smallest of the three probabilities."""
+        return min(self.p_tilt, self.p_turn, self.p_scale)
 
     @property
     def counts(self) -> bool:
         """Whether chance does not explain it."""
-        return min(self.p_tilt, self.p_turn, self.p_scale) < CHANCE
+        return self.least_chance < CHANCE
 
     @property
     def tilt_m(self) -> tuple[float, float]:

@@ -14,6 +14,8 @@ So the adjustment need not be made anew. N_s vanishes where nothing but the posi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
@@ -42,7 +44,7 @@ def common_shift(system: NormalSystem, solution: Solution, factor: Factor, sigma
 
 def _of_rows(rows: Rows, factor: Factor, counts: tuple[int, int], sigma0: float) -> CommonShift | None:
     whitened = rows.inv_sigma[:, :, None] * np.eye(3)
-    left = whitened - explained_by_others(rows, whitened, factor, counts)
+    left = whitened - explained_by_others([(rows, whitened)], factor, counts)
     weight, normals = np.einsum("gak,gak->k", whitened, whitened), np.einsum("gak,gaj->kj", whitened, left)
     scale = np.sqrt(weight)
     if not weight.all() or np.linalg.eigvalsh(normals / scale[:, None] / scale)[0] < DETERMINED:
@@ -56,22 +58,31 @@ def _of_rows(rows: Rows, factor: Factor, counts: tuple[int, int], sigma0: float)
     return CommonShift(shift, noise * np.sqrt(np.diagonal(cofactors)), p)
 
 
-def explained_by_others(rows: Rows, whitened: np.ndarray, factor: Factor, counts: tuple[int, int]) -> np.ndarray:
-    """(g, 3, k) E·Q·Eᵀ of k columns (g, 3, k).
+def explained_by_others(
+    parts: Sequence[tuple[Rows, np.ndarray]], factor: Factor, counts: tuple[int, int]
+) -> np.ndarray:
+    """(g, 3, k) E·Q·Eᵀ of k columns (g, 3, k), of the rows and columns of all parts together.
 
     Parameters
     ----------
-    counts : of the photographs and the shared parameters.
+    parts : whitened observations, and columns of theirs. counts : of the photographs and the shared parameters.
     """
     n, s = counts
-    k = whitened.shape[2]
+    k = parts[0][1].shape[2]
     images, shared = np.zeros((n, 6, k)), np.zeros((s, k))
-    there = rows.columns >= 0
-    np.add.at(images, rows.image, np.einsum("gat,gak->gtk", rows.by_image, whitened))
-    pulls = np.einsum("gac,gak->gck", rows.by_shared, whitened)
-    np.add.at(shared, rows.columns[there], pulls[there])
+    for rows, columns in parts:
+        there = rows.columns >= 0
+        np.add.at(images, rows.image, np.einsum("gat,gak->gtk", rows.by_image, columns))
+        pulls = np.einsum("gac,gak->gck", rows.by_shared, columns)
+        np.add.at(shared, rows.columns[there], pulls[there])
     x = factor.solve(np.concatenate([images.reshape(6 * n, k), shared]))
-    found = np.einsum("gat,gtk->gak", rows.by_image, x[: 6 * n].reshape(n, 6, k)[rows.image])
-    at_shared = np.zeros((*rows.columns.shape, k))
-    at_shared[there] = x[6 * n :][rows.columns[there]]
-    return found + np.einsum("gac,gck->gak", rows.by_shared, at_shared)
+    return np.concatenate([_predicted(rows, x[: 6 * n].reshape(n, 6, k), x[6 * n :]) for rows, _ in parts])
+
+
+def _predicted(rows: Rows, images: np.ndarray, shared: np.ndarray) -> np.ndarray:
+    """(g, 3, k) what photographs (n, 6, k) and shared parameters (s, k) change of the observations."""
+    there = rows.columns >= 0
+    at_shared = np.zeros((*rows.columns.shape, images.shape[2]))
+    at_shared[there] = shared[rows.columns[there]]
+    changes = np.einsum("gat,gtk->gak", rows.by_image, images[rows.image])
+    return changes + np.einsum("gac,gck->gak", rows.by_shared, at_shared)
