@@ -441,3 +441,21 @@ def test_stated_values_in_place_of_exif_are_said(tmp_path):
     said = find_photographs(tmp_path, StatedCamera((), 6.0, None)).messages
     assert said == ("--focal-length-mm 6 is used in place of 8.8 mm in EXIF of 2 photographs",)
     assert find_photographs(tmp_path, StatedCamera((), 8.8, None)).messages == ()
+
+
+def test_positions_of_rtk():
+    """Kinds of solution and the heights' system are said; WGS 84 of EXIF is taken as the datum of the block."""
+    from dataclasses import replace
+
+    from aerotri.formats.assembly.assemble import Statements
+    from aerotri.tie_points.given import Given, positions_in
+
+    quality = np.array(["fixed", "single point"])
+    photographs = replace(photographs_of_exif(), quality=quality, ellipsoidal=np.array([True, False]))
+    positions, said = positions_in(photographs, Given(stated=Statements(crs="EPSG:25832")), "EPSG:25832")
+    assert positions is not None
+    np.testing.assert_allclose(positions.xyz[0], [500000.0, 5316300.7, 500.0], atol=1.0)
+    text = " ".join(said)
+    assert "of RTK: 1 fixed, 1 single point" in text
+    assert "sea level" in text
+    assert "EPSG:25832 names no system of heights" in text

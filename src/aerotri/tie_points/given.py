@@ -13,7 +13,8 @@ from aerotri.formats.assembly import assemble, placing
 from aerotri.formats.assembly.assemble_control import with_check_points, with_control
 from aerotri.formats.assembly.names_match import match_photographs
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, Reading, no_sigma
-from aerotri.formats.text.notes import assumed, left_behind
+from aerotri.formats.assembly.timed import SINGLE, in_words
+from aerotri.formats.text.notes import assumed, left_behind, taken
 from aerotri.observations import Block
 from aerotri.tie_points.photographs import PhotographSet
 from aerotri.tie_points.settings import DEFAULTS
@@ -89,11 +90,8 @@ def positions_in(photographs: PhotographSet, given: Given, crs: str) -> tuple[Po
     if first is not None and not getattr(first, "crs", "") and not given.stated.crs:
         about = f"{crs}, in which it lies where the photographs were taken, is taken; state another with --crs"
         said.append(assumed(f"{first.path.name} names no coordinate system: {about}"))
-    if "+" in crs and photographs.ellipsoidal[known].all():
-        flat = placing.from_ellipsoidal_heights(flat, crs, given.stated.geoid)
-    elif not photographs.ellipsoidal[known].any():
-        about = "heights of EXIF count from sea level; they are taken as those of the block's CRS as they are"
-        said.append(assumed(about))
+    flat, heights_said = _with_heights(flat, photographs.ellipsoidal[known], crs, given)
+    said += (*heights_said, *_about_rtk(photographs, known))
     stated = given.stated.positions_sigma_m
     sigma = photographs.sigma_m[known]
     if stated is None and np.isnan(sigma).any():
@@ -102,6 +100,40 @@ def positions_in(photographs: PhotographSet, given: Given, crs: str) -> tuple[Po
     sigma = np.where(np.isnan(sigma), np.array(stated or EXIF_SIGMA_M), sigma)
     path = photographs.paths[0].parent
     return PositionList(path, photographs.names[known], flat, sigma, no_sigma(len(known))), tuple(said)
+
+
+def _with_heights(
+    xyz: np.ndarray, ellipsoidal: np.ndarray, crs: str, given: Given
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Positions of EXIF with the heights of the CRS, and what to say of these.
+
+    Parameters
+    ----------
+    xyz : (n, 3), X and Y in the CRS. ellipsoidal : (n,) bool, whether the height counts from the ellipsoid.
+    """
+    said = []
+    if not ellipsoidal.all():
+        some = "" if not ellipsoidal.any() else f" of {int((~ellipsoidal).sum())} photographs"
+        about = "count from sea level; they are taken as those of the block's CRS as they are"
+        said.append(assumed(f"heights of EXIF{some} {about}"))
+    if ellipsoidal.any() and "+" in crs:
+        xyz = xyz.copy()
+        xyz[ellipsoidal] = placing.from_ellipsoidal_heights(xyz[ellipsoidal], crs, given.stated.geoid)
+        said.append(taken(f"ellipsoidal heights of EXIF were brought to those of {crs}"))
+    elif ellipsoidal.any():
+        said.append(placing.about_ellipsoidal("EXIF", crs))
+    return xyz, tuple(said)
+
+
+def _about_rtk(photographs: PhotographSet, known: np.ndarray) -> tuple[str, ...]:
+    """What to say of the solutions of a drone with RTK, of photographs (k,)."""
+    if photographs.quality is None or not (photographs.quality[known] != "").any():
+        return ()
+    quality = photographs.quality[known]
+    said = f"positions of EXIF are of RTK: {in_words(quality)}"
+    if (quality == SINGLE).any():
+        said += "; those of a single point get the σ that these have, whatever XMP states"
+    return (taken(said),)
 
 
 def _about_heights(photographs: PhotographSet) -> tuple[str, ...]:

@@ -39,6 +39,7 @@ class PhotographSet:
     lon_lat_height : (n, 3) degrees and m; sigma_m : (n, 3) m; NaN where not known.
     ellipsoidal : (n,) bool, whether the height is said to count from the ellipsoid.
     time : (n,) s by the clock of the camera, NaN where not known.
+    quality : (n,) str, kind of solution of a drone with RTK, '' where not known; None: of none.
     messages : what the user should know of them.
     """
 
@@ -50,6 +51,7 @@ class PhotographSet:
     sigma_m: np.ndarray
     ellipsoidal: np.ndarray
     time: np.ndarray | None = None
+    quality: np.ndarray | None = None
     messages: tuple[str, ...] = ()
 
     @property
@@ -79,6 +81,7 @@ class PhotographSet:
             sigma_m=self.sigma_m[rows],
             ellipsoidal=self.ellipsoidal[rows],
             time=None if self.time is None else self.time[rows],
+            quality=None if self.quality is None else self.quality[rows],
             messages=self.messages,
         )
 
@@ -129,6 +132,7 @@ def find_photographs(folder: Path, stated: StatedCamera = StatedCamera()) -> Pho
         sigma_m=np.array([tag.sigma_m for tag in tags]),
         ellipsoidal=np.array([tag.ellipsoidal for tag in tags]),
         time=np.array([tag.time for tag in tags]),
+        quality=texts([tag.quality for tag in tags]),
         messages=() if stated.cameras else _about_replaced(tags, stated),
     )
 

@@ -107,3 +107,22 @@ def test_real_photograph(shared_data):
     tags = read_exif(shared_data("brighton") / "images" / "DJI_0018.JPG")
     assert (tags.model, tags.size_px, tags.focal_length_mm) == ("FC300S", (2800, 1575), 3.61)
     np.testing.assert_allclose(tags.lon_lat_height, [-91.994559889, 46.842607083, 198.309], atol=2e-9)
+
+
+@pytest.mark.parametrize(
+    ("flag", "more", "quality", "ellipsoidal", "sigma"),
+    [
+        (50, "", "fixed", True, (0.01116, 0.01234, 0.02622)),
+        (34, "", "float", True, (0.01116, 0.01234, 0.02622)),
+        (16, "", "single point", False, (1.5, 1.5, 3.0)),
+        (16, ' drone-dji:AltitudeType="RtkAlt"', "single point", True, (1.5, 1.5, 3.0)),
+        (50, ' drone-dji:AltitudeType="GpsFusionAlt"', "fixed", False, (0.01116, 0.01234, 0.02622)),
+    ],
+)
+def test_solution_of_rtk(tmp_path, flag, more, quality, ellipsoidal, sigma):
+    """σ of XMP for what is solved, that of code alone for a single point; heights of RTK count from the ellipsoid."""
+    xmp = XMP.replace(b'RtkFlag="50"', f'RtkFlag="{flag}"{more}'.encode())
+    gps = {1: "N", 2: (10.0, 0.0, 0.0), 3: "E", 4: (20.0, 0.0, 0.0), 5: b"\x00", 6: 512.0}
+    tags = photograph(tmp_path / "a.jpg", {}, gps, xmp=xmp)
+    assert (tags.quality, tags.ellipsoidal) == (quality, ellipsoidal)
+    assert tuple(tags.sigma_m) == sigma

@@ -144,10 +144,7 @@ def from_gnss(
     elif wanted != plan_of(crs):
         said = taken(f"heights of {name} count from the ellipsoid, and were brought to those of {crs}")
     else:
-        said = assumed(
-            f"heights of {name} count from the ellipsoid, and {crs} names no system of heights: those of control "
-            f"points have to count from the ellipsoid too; where they do not, state their system: --crs {crs}+…"
-        )
+        said = about_ellipsoidal(name, crs)
     source = datum_of_base(place, given.crs, plan_of(crs))
     of_datum = assumed(f"{name}: WGS 84 is taken as the datum of {crs}, as that of its base station")
     messages = (said,) if source == given.crs else (said, of_datum)
@@ -155,6 +152,14 @@ def from_gnss(
         return to_crs(place, source, wanted, geoid), messages
     except InputError as error:
         raise InputError(error.message, error.remedy, given.path) from error
+
+
+def about_ellipsoidal(name: str, crs: str) -> str:
+    """A note on ellipsoidal heights of a file in a block whose CRS names no system of heights."""
+    return assumed(
+        f"heights of {name} count from the ellipsoid, and {crs} names no system of heights: those of control points "
+        f"have to count from the ellipsoid too; where they do not, state their system: --crs {crs}+…"
+    )
 
 
 def datum_of_base(place: np.ndarray, source: str, plan: str) -> str:

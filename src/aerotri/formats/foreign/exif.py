@@ -1,7 +1,8 @@
 """What photographs say of themselves: size, camera, focal length and position, from EXIF and XMP (read by Pillow).
 
 EXIF's altitude counts from sea level (references 0 and 1) or from the ellipsoid (2 and 3). Where a drone knows the
-standard deviations of its position, they stand in its XMP (``RtkStdLon`` …) or in GPSHPositioningError.
+standard deviations of its position, they stand in its XMP (``RtkStdLon`` …) or in GPSHPositioningError. Heights of a
+drone with RTK count from the ellipsoid; ``RtkFlag`` is the kind of its solution.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.formats.assembly.timed import FIXED, FLOAT, true_sigma
+from aerotri.formats.foreign.dji_mrk import QUALITY
 
 FORMATS = ("JPEG", "TIFF")
 EXIF_IFD, GPS_IFD = 0x8769, 0x8825
@@ -50,6 +53,7 @@ class PhotographTags:
     ellipsoidal : whether the height is said to count from the ellipsoid.
     sigma_m : (3,) east, north, up, NaN where not said.
     time : s since the beginning of 1970, by the clock of the camera, NaN where not said.
+    quality : the kind of solution of a drone with RTK, as in `timed`; '' where not said.
     """
 
     size_px: tuple[int, int]
@@ -61,6 +65,7 @@ class PhotographTags:
     ellipsoidal: bool
     sigma_m: np.ndarray
     time: float = float("nan")
+    quality: str = ""
 
 
 def read_exif(path: FilePath) -> PhotographTags:
@@ -84,6 +89,7 @@ def read_exif(path: FilePath) -> PhotographTags:
     own = plain | own
     focal = _number(own.get(FOCAL_LENGTH))
     lon_lat_height, ellipsoidal = _position(gps)
+    quality, by_rtk = _rtk(xmp)
     return PhotographTags(
         size_px=(int(size[0]), int(size[1])),
         make=_text(plain.get(MAKE)),
@@ -91,9 +97,10 @@ def read_exif(path: FilePath) -> PhotographTags:
         focal_length_mm=focal,
         pixel_um=_pixel_um(own, size, focal),
         lon_lat_height=lon_lat_height,
-        ellipsoidal=ellipsoidal,
-        sigma_m=_sigma(gps, xmp),
+        ellipsoidal=ellipsoidal or by_rtk,
+        sigma_m=true_sigma(_sigma(gps, xmp)[None], np.array([quality]))[0],
         time=_time(own),
+        quality=quality,
     )
 
 
@@ -182,6 +189,18 @@ def _degrees(value: Any) -> float:
 def _xmp(image: Any) -> str:
     packet = image.info.get("xmp", b"")
     return packet.decode("utf-8", "replace") if isinstance(packet, bytes) else str(packet)
+
+
+def _rtk(xmp: str) -> tuple[str, bool]:
+    """The kind of solution of DJI's drones with RTK, and whether the height comes from it.
+
+    Such heights count from the ellipsoid, whatever EXIF's reference says [D: they equal those of the .MRK]. Newer
+    drones say where a height comes from (AltitudeType); of older ones it is that of RTK where RTK had a solution.
+    """
+    flag = re.search(r'RtkFlag\s*(?:=\s*"|>)\s*\+?(\d{1,3})', xmp)
+    quality = QUALITY.get(int(flag[1]), "") if flag is not None else ""
+    source = re.search(r'AltitudeType\s*(?:=\s*"|>)\s*(\w+)', xmp)
+    return quality, quality in (FIXED, FLOAT) if source is None else source[1].lower() == "rtkalt"
 
 
 def _sigma(gps: dict[int, Any], xmp: str) -> np.ndarray:
