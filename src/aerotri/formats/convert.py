@@ -37,6 +37,8 @@ from aerotri.formats.foreign.metashape_project import read_metashape_project
 from aerotri.formats.foreign.odm import write_odm_gcp
 from aerotri.formats.foreign.opensfm import is_opensfm, read_opensfm, write_opensfm
 from aerotri.formats.foreign.opensfm_in_place import origin_of, update_opensfm
+from aerotri.formats.foreign.opf import read_opf
+from aerotri.formats.foreign.opf_files import is_opf
 from aerotri.formats.foreign.patb import write_patb
 from aerotri.formats.foreign.pix4d import write_pix4d_eo, write_pix4d_gcp, write_pix4d_geo
 from aerotri.formats.foreign.pix4d_params import is_pix4d_params, read_pix4d_params
@@ -54,6 +56,7 @@ RECOGNISERS: Mapping[str, Callable[[Path], bool]] = {
     "dbat": is_dbat,
     "bal": is_bal,
     "bundler": is_bundler,
+    "opf": is_opf,
     "opensfm": is_opensfm,
     "metashape-project": is_metashape_project,
     "pix4d-params": is_pix4d_params,
@@ -71,6 +74,7 @@ READERS: Mapping[str, Callable[[Path], tuple[Block, np.ndarray | None]]] = {
     "dbat": lambda path: (read_dbat(path), None),
     "bal": read_bal,
     "bundler": lambda path: _block_and_points(read_bundler(path)),
+    "opf": lambda path: _block_and_points(read_opf(path)),
     "opensfm": lambda path: _block_and_points(read_opensfm(path)),
     "metashape-project": lambda path: _block_and_points(read_metashape_project(path)),
     "pix4d-params": lambda path: _block_and_points(read_pix4d_params(path)),

@@ -102,6 +102,10 @@ def _projects(written: dict[str, dict[str, bytes]]) -> list[Target]:
             return read_project(Request(f"metashape-project:{folder / source}", "x"))
 
         targets.append(Target(f"metashape project {ending}", files, tuple(files), read_site))
+    opf = seeds.of_tests("opf_sample").OpfProject
+    for files in (opf().files(), opf("EPSG:3044", False, "fisheye").files()):
+        read_opf = lambda folder: read_project(Request(f"opf:{folder / 'project.opf'}", "x"))  # noqa: E731
+        targets.append(Target("opf", files, tuple(files), read_opf))
     for kind, name, content in seeds.whole_files():
 
         def read_file(folder: Path, kind: str = kind, name: str = name) -> object:

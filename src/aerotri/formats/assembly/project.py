@@ -42,6 +42,7 @@ from aerotri.formats.foreign.list_header import has_attitudes
 from aerotri.formats.foreign.metashape_project import read_metashape_project
 from aerotri.formats.foreign.opensfm import read_opensfm
 from aerotri.formats.foreign.opensfm_gcp import NAME as OPENSFM_GCP
+from aerotri.formats.foreign.opf import read_opf
 from aerotri.formats.foreign.pix4d import read_pix4d_offset
 from aerotri.formats.foreign.pix4d_params import read_pix4d_params
 from aerotri.formats.text.notes import assumed, left_behind
@@ -51,7 +52,7 @@ FOLDERS = {"ign": "IGN", "patb": "PAT-B"}
 """Kinds of folders whose files are parts."""
 UNKNOWN_PIXEL_UM = 1.0
 """Size of a pixel where nothing tells it; a principal distance of 3000 pixels then reads 3 mm."""
-MAY_FREE = ("blocks-exchange", "bundler", "colmap", "metashape-project", "opensfm", "pix4d-params")
+MAY_FREE = ("blocks-exchange", "bundler", "colmap", "metashape-project", "opensfm", "opf", "pix4d-params")
 """Whole blocks whose interior elements --free-interior makes unknowns."""
 CONTROL_BESIDE = (OPENSFM_GCP, "gcp_list.txt")
 """Control points of OpenSfM beside its reconstruction."""
@@ -244,6 +245,8 @@ def _as_it_is(request: Request, sources: Sources) -> Reading | None:
         return read_metashape_project(path, pixel_um)
     if kind == "blocks-exchange":
         return read_blocks_exchange(path, pixel_um, request.stated.geoid)
+    if kind == "opf":
+        return read_opf(path, pixel_um, request.stated.geoid)
     if kind == "pix4d-params":
         offset = None if request.offset is None else read_pix4d_offset(request.offset)
         return read_pix4d_params(path, pixel_um, offset)
