@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
+from functools import cache
 
 import pytest
 from PIL import Image
@@ -26,9 +27,14 @@ def picture(form: str) -> bytes:
 GOOD = {"logo.png": picture("PNG"), "of us.JPG": picture("JPEG"), "logo.svg": SVG}
 
 
+@cache
+def plain():
+    return rolling_block(1)[0]
+
+
 @pytest.fixture
 def folder(tmp_path):
-    write_block(rolling_block(1)[0], tmp_path / "block")
+    write_block(plain(), tmp_path / "block")
     return tmp_path / "block"
 
 
@@ -81,6 +87,68 @@ def test_refused_with_line_and_remedy(folder, name, content, said):
     line = (folder / "block.toml").read_text().splitlines().index(f"logo = '{name}'") + 1
     assert (error.file.name, error.line) == ("block.toml", line)
     assert error.remedy
+
+
+NESTED = b"".join(
+    b'<g id="n%d"><use href="#n%d"/><use href="#n%d"/></g>' % (k, k + 1, k + 1) for k in range(30)
+) + b'<g id="n30"><path/></g>'  # fmt: skip
+HOSTILE = {
+    "script": b"<script>alert(1)</script>",
+    "script in capitals": b"<SCRIPT>alert(1)</SCRIPT>",
+    "script of pages": b'<x:script xmlns:x="http://www.w3.org/1999/xhtml">alert(1)</x:script>',
+    "script of a namespace of its own": b'<x:script xmlns:x="urn:x">alert(1)</x:script>',
+    "page": b"<foreignObject><p/></foreignObject>",
+    "frame": b'<iframe src="#a"/>',
+    "event": b'<rect onload="alert(1)"/>',
+    "event in capitals": b'<rect OnClick="alert(1)"/>',
+    "animation": b'<a id="a"><set attributeName="href" to="javascript:alert(1)"/></a>',
+    "program as address": b'<image href="java\tscript:alert(1)"/>',
+    "address": b'<image href="https://example.org/a.png"/>',
+    "address after a blank": b'<image xlink:href=" //example.org/a" xmlns:xlink="http://www.w3.org/1999/xlink"/>',
+    "drawing in a drawing": b'<image href="data:image/svg+xml;base64,AAAA"/>',
+    "page as data": b'<image href="data:text/html,x"/>',
+    "base": b'<g xml:base="https://example.org/"/>',
+    "fill": b'<rect fill="url(https://example.org/a.svg#b)"/>',
+    "style of an element": b"<rect style=\"fill: URL( 'file:///etc/passwd' )\"/>",
+    "style": b"<style>@import 'https://example.org/a.css';</style>",
+    "style with escapes": b"<style>rect { fill: \\75rl(https://example.org) }</style>",
+    "uses itself": b'<g id="a"><use href="#a"/></g>',
+    "uses without bound": NESTED,
+    "deep": b"<g>" * 200 + b"</g>" * 200,
+}
+
+
+@pytest.mark.parametrize("inside", HOSTILE.values(), ids=HOSTILE)
+def test_drawings_that_are_more_than_drawings(folder, tmp_path, inside):
+    content = SVG.replace(b"<rect", inside + b"<rect")
+    (folder / "logo.svg").write_bytes(content)
+    with pytest.raises(InputError, match=r"project\.logo = 'logo\.svg' (contains|has|refers|uses|draws)") as caught:
+        read_block(with_logo(folder, "logo.svg"))
+    assert caught.value.file.name == "block.toml"
+    block = replace(plain(), project=Project(logo="logo.svg", logo_content=content))
+    with pytest.raises(InputError, match=r"project\.logo = 'logo\.svg'"):
+        write_block(block, tmp_path / "copy")
+
+
+def test_style_sheets_are_refused(folder):
+    (folder / "logo.svg").write_bytes(b'<?xml-stylesheet href="https://example.org/a.css"?>' + SVG)
+    with pytest.raises(InputError, match="style sheet"):
+        aerotri.check(with_logo(folder, "logo.svg"))
+
+
+def test_usual_drawings_are_taken(folder):
+    """As Inkscape writes them: its own elements, gradients, styles, a picture inside."""
+    inside = (
+        b'<sodipodi:namedview xmlns:sodipodi="http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd" id="base"/>'
+        b'<metadata><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"><rdf:li rdf:resource="x"/>'
+        b'</rdf:RDF></metadata><defs><linearGradient id="a"><stop offset="0" style="stop-color:#fff"/></linearGradient>'
+        b'<linearGradient id="b" xlink:href="#a" xmlns:xlink="http://www.w3.org/1999/xlink"/></defs>'
+        b"<style>.c { fill: url(#b) }</style><g><use href='#d'/>"
+        b"<path id='d' class='c' style='fill:url(#a);stroke:none'/>"
+        b'<image href="data:image/png;base64,AAAA"/><text>once\\twice</text></g>'
+    )
+    (folder / "logo.svg").write_bytes(SVG.replace(b"<rect", inside + b"<rect"))
+    assert read_block(with_logo(folder, "logo.svg")).project.logo_content
 
 
 def test_a_link_out_of_the_block_is_refused(folder, tmp_path):

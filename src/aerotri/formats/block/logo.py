@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import Protocol
 
 from aerotri.conventions import InputError, real_path
+from aerotri.formats.block.svg_drawing import fault_of_drawing
 from aerotri.observations.project import Project
 
 ENDINGS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".svg": "SVG"}
@@ -102,10 +103,9 @@ def _check_svg(content: bytes, path: Path, refuse: Callable[..., InputError]) ->
         raise refuse(f"{error.message}", "save it as plain SVG, or as PNG") from None
     if root.tag.rpartition("}")[2] != "svg":
         raise refuse("is no SVG drawing", "save it as plain SVG, or as PNG")
-    for element in root.iter():
-        for key, value in element.attrib.items():
-            if key.rpartition("}")[2] == "href" and not value.startswith(("#", "data:")):
-                raise refuse("refers to other files", "embed them, or save it as PNG")
+    fault = "names a style sheet" if b"<?xml-stylesheet" in content else fault_of_drawing(root)
+    if fault:
+        raise refuse(fault, "save it as plain SVG, or as PNG")
 
 
 def logo_to_write(project: Project) -> dict[str, bytes]:
@@ -114,8 +114,16 @@ def logo_to_write(project: Project) -> dict[str, bytes]:
     Raises
     ------
     InputError
-        When the name leads out of the folder.
+        When the name leads out of the folder, or the content is no such picture.
     """
     if _leads_out(project.logo):
         raise InputError(f"project.logo = '{project.logo}' is outside the block folder", REMEDY)
+    if project.logo and project.logo_content:
+
+        def refuse(message: str, remedy: str = REMEDY) -> InputError:
+            return InputError(f"project.logo = '{project.logo}' {message}", remedy)
+
+        if Path(project.logo).suffix.lower() not in ENDINGS:
+            raise refuse("is not a PNG, JPEG or SVG file")
+        _check_picture(project.logo_content, Path(project.logo), refuse)
     return {project.logo: project.logo_content} if project.logo and project.logo_content else {}
