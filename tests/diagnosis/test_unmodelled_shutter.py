@@ -8,6 +8,7 @@ import pytest
 import aerotri
 import wrong_blocks
 from aerotri.diagnosis.unmodelled_shutter import of_unmodelled_shutter
+from aerotri.observations import Prior
 from aerotri.observations.rolling_shutter import RollingShutter
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.results.unmodelled_shutter import CHANCE, SUSPECTED
@@ -68,6 +69,34 @@ def test_where_it_is_modelled_there_is_none_to_find():
     result = adjust_keeping_system(replace(block, cameras=modelled)).local
     assert result.unmodelled_shutter is None
     assert not any(WORDS in reason for reason in result.outcome.reasons)
+
+
+def strips_of_two(block, shutter, spoil=lambda block: block):
+    """Every second strip by camera a, which states its shutter and whose image points are spoilt; the others by b."""
+    camera = block.cameras[0]
+    of_b = np.unique(block.images.strip, return_inverse=True)[1] % 2
+    rays = block.image_points
+    xy = np.where(of_b[rays.image][:, None] == 1, rays.xy, spoil(block).image_points.xy)
+    cameras = (replace(camera, name="a", rolling_shutter=shutter), replace(camera, name="b"))
+    images = replace(block.images, camera=of_b)
+    return replace(block, cameras=cameras, images=images, image_points=replace(rays, xy=xy))
+
+
+@pytest.mark.parametrize("readout", [Prior(), Prior(30.0, fixed=True)])
+def test_the_shutter_of_another_camera_stays_as_it_is_stated(readout):
+    """Neither tested itself, be it an unknown, nor replaced by one at the usual speed."""
+    block = drone(2)
+    block = replace(block, gnss_ins=replace(block.gnss_ins, time=np.full(len(block.gnss_ins), np.nan)))
+    shutter = RollingShutter(readout, speed_m_s=10.0, test="off")
+    found = found_in(strips_of_two(block, shutter, wrong_blocks.rolling_shutter(0.3)))
+    assert found.camera == "b"
+    assert found.p > CHANCE
+
+
+def test_its_way_beside_a_stated_shutter():
+    found = found_in(strips_of_two(drone(2, readout_ms=15.0), RollingShutter(Prior(15.0, fixed=True), test="off")))
+    assert (found.camera, found.counts) == ("b", True)
+    assert abs(abs(found.way_m) - 0.15) < 4.0 * found.sigma_m
 
 
 def test_cameras_without_one():

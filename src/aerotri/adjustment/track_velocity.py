@@ -225,7 +225,7 @@ def _along(block: Block, images: np.ndarray, centre: np.ndarray, strip: np.ndarr
 def strip_velocities(block: Block, images: np.ndarray, centre: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """(n, 3) velocities of the strips of photographs in units of the usual one; 0 of a photograph alone.
 
-    By the times of a strip where it has them all, else by its base an exposure.
+    By times where all wanted photographs have them, else by the base an exposure: units of one kind for all.
 
     Parameters
     ----------

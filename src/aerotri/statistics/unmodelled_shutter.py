@@ -17,6 +17,7 @@ as sensors are built. σ counts total: it grows as that of the object points doe
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Collection
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -86,7 +87,7 @@ def unmodelled_shutter(system: NormalSystem, solution: Solution, adjusted: Adjus
     if not shutters:
         return None
     smooth_um = adjusted.outcome.sigma0_um
-    step = _step(system, solution, _with_terms(block, shutters, _lens_terms(block), smooth_um))
+    step = _step(system, solution, _with_terms(block, shutters, _lens_terms(block), smooth_um), shutters)
     if step is None:
         return None
     unit, k = adjusted.outcome.sigma0 * _total(adjusted), step.worst
@@ -103,8 +104,8 @@ def unmodelled_shutter(system: NormalSystem, solution: Solution, adjusted: Adjus
     )  # fmt: skip
     if p >= CHANCE:
         return found
-    terms = (*_lens_terms(block), *AFFINITY)
-    beside = _step(system, solution, _with_terms(block, {camera.name: shutters[camera.name]}, terms, smooth_um))
+    terms, alone = (*_lens_terms(block), *AFFINITY), {camera.name: shutters[camera.name]}
+    beside = _step(system, solution, _with_terms(block, alone, terms, smooth_um), alone)
     if beside is None:
         return found
     t = float(beside.way[0] / (unit * beside.root[0]))
@@ -161,8 +162,13 @@ def _with_terms(block: Block, shutters: dict[str, RollingShutter], terms: tuple[
     return replace(block, cameras=cameras, settings=replace(block.settings, adjustment=adjustment))
 
 
-def _step(system: NormalSystem, solution: Solution, block: Block) -> _Step | None:
-    """One step from the solution to that of a block with more unknowns; None where these are not determined."""
+def _step(system: NormalSystem, solution: Solution, block: Block, tested: Collection[str]) -> _Step | None:
+    """One step from the solution to that of a block with more unknowns; None where these are not determined.
+
+    Parameters
+    ----------
+    tested : cameras with a way among these unknowns; those that state a shutter keep theirs as it is.
+    """
     old, estimator = system.unknowns, solution.estimator
     row, axis = np.nonzero(old.point_held)
     held = list(zip(old.points[row].tolist(), axis.tolist(), strict=True)) if len(row) else None
@@ -171,8 +177,9 @@ def _step(system: NormalSystem, solution: Solution, block: Block) -> _Step | Non
     try:
         other, start = build_system(block, start_values_at(old, solution.state), status, held)
         state = with_shared(other.unknowns, old, start, solution.state)
-        other = _with_strip_velocities(at_adjusted_positions(other, state, estimator), state)
-        columns = [k for k, name in enumerate(other.unknowns.shared.names) if name == READOUT]
+        other = _with_strip_velocities(at_adjusted_positions(other, state, estimator), state, tested)
+        shared = zip(other.unknowns.shared.names, other.unknowns.shared.groups, strict=True)
+        columns = [k for k, (name, camera) in enumerate(shared) if name == READOUT and camera in tested]
         equations = other.assemble(state, 0.0, estimator)
         factor = other.factorise(equations)
     except (InputError, NotPositiveDefiniteError):
@@ -207,13 +214,14 @@ def _without_gross(system: NormalSystem, solution: Solution) -> np.ndarray:
     return (keep & seen[point]) | (~seen & u.point_held.any(axis=1))[point]
 
 
-def _with_strip_velocities(system: NormalSystem, state: State) -> NormalSystem:
-    """The system with the velocities of whole strips, in units of the usual one."""
+def _with_strip_velocities(system: NormalSystem, state: State, tested: Collection[str]) -> NormalSystem:
+    """The system with the velocities of whole strips, in units of the usual one, for the cameras that are tested."""
     u, scanning = system.unknowns, system.unknowns.scanning
     if scanning is None:
         return system
-    velocity = strip_velocities(u.block, u.images, state.centre, scanning.rolling)
-    in_camera = np.einsum("nji,nj->ni", state.rotation, velocity)
+    rolling = np.array([camera.name in tested for camera in u.block.cameras])[u.block.images.camera[u.images]]
+    velocity = strip_velocities(u.block, u.images, state.centre, rolling)
+    in_camera = np.where(rolling[:, None], np.einsum("nji,nj->ni", state.rotation, velocity), scanning.velocity)
     other = copy(system)
     other.unknowns = replace(u, scanning=replace(scanning, velocity=in_camera))
     return other
