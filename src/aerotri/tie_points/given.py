@@ -45,10 +45,10 @@ class Given:
 
 
 def crs_of(photographs: PhotographSet, given: Given) -> str:
-    """As stated, else of the control, else of the positions; UTM where these are geographic, 'local' without any."""
+    """As stated, else of the control, positions or orientations; UTM where geographic, 'local' without any."""
     if given.stated.crs:
         return placing.known_crs(given.stated.crs)
-    lists = [part for part in (given.control, given.positions) if part is not None]
+    lists = [part for part in (given.control, given.positions, given.orientation) if part is not None]
     known = photographs.in_plan
     utm = utm_crs(*photographs.lon_lat_height[known, :2].T) if known.any() else ""
     told = placing.system_of_lists(lists)
@@ -58,8 +58,7 @@ def crs_of(photographs: PhotographSet, given: Given) -> str:
         return utm if utm and in_degrees else told
     if not utm:
         return "local"
-    centres = [part.centre for part in (given.orientation,) if part is not None]
-    coordinates = [*(part.xyz for part in lists), *centres]
+    coordinates = [part.centre if isinstance(part, OrientationList) else part.xyz for part in lists]
     return utm if all(_lie_near(photographs.lon_lat_height[known], utm, xyz) for xyz in coordinates) else "local"
 
 

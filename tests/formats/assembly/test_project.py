@@ -12,6 +12,7 @@ from oriented_sample import oriented_sample, prediction
 from aerotri.conventions import InputError
 from aerotri.coordinates import local_frame
 from aerotri.crs_text import plan_of
+from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.assemble import Statements
 from aerotri.formats.assembly.camera_spec import CameraSpec
 from aerotri.formats.assembly.names_match import match_photographs
@@ -34,6 +35,8 @@ from aerotri.observations import Prior
 from aerotri.observations.names import prefix_of
 
 UTM = (717000.0, 1606000.0, 0.0)
+UTM_WKT = 'PROJCS["WGS 84 / UTM zone 47N",AUTHORITY["EPSG","32647"]]'
+SIGMAS = ("control_sigma_m", "positions_sigma_m")
 SPEC = CameraSpec(name="P1", size_px=(8000, 6000), pixel_um=5.0, focal_length_mm=40.0)
 CAMERAS_TOML = """\
 [camera.P1]
@@ -169,6 +172,53 @@ def test_axes(files):
     )
     sample = oriented_sample(shift=UTM).block
     np.testing.assert_allclose(reading.block.control.xyz, sample.control.xyz, rtol=0, atol=5.1e-7)
+
+
+def with_system(files, crs):
+    """The orientations of the sample under a system that a comment names."""
+    text = (files / "opk.txt").read_text()
+    (files / "named.txt").write_text(f"# CoordinateSystem: {crs}\n{text}")
+    return str(files / "named.txt")
+
+
+def test_orientations_name_the_system_of_the_block(files):
+    source = with_system(files, UTM_WKT)
+    for changes in ({"orientation": source}, {"source": source, "image_points": (str(files / "points.txt"),)}):
+        reading = read_project(request(files, **changes))
+        assert reading.block.crs == "EPSG:32647"
+    with pytest.raises(InputError, match=r"is in EPSG:32648, the block in EPSG:32647"):
+        read_project(request(files, orientation=with_system(files, "EPSG:32648"), stated=Statements(crs="EPSG:32647")))
+
+
+@pytest.mark.parametrize(
+    ("crs", "of_block", "says"),
+    [
+        ("EPSG:32647", "EPSG:32647+5773", "heights count as ellipsoidal, and were brought to those of EPSG:32647+5773"),
+        ("EPSG:32647+5773", "EPSG:32647", "heights of EPSG:32647+5773 were brought to ellipsoidal ones"),
+        ("EPSG:32647", "EPSG:32647", ""),
+    ],
+)
+def test_heights_of_orientations(files, monkeypatch, crs, of_block, says):
+    """The plan has to be that of the block, heights are brought there as those of control are."""
+    monkeypatch.setattr(placing, "to_crs", lambda xyz, source, target, _: xyz + [0, 0, 10.0 * (source != target)])
+    stated = Statements(crs=of_block)
+    plain = read_project(request(files, orientation=str(files / "opk.txt"), stated=stated))
+    found = read_project(request(files, orientation=with_system(files, crs), stated=stated))
+    moved = found.block.images.centre - plain.block.images.centre
+    np.testing.assert_allclose(moved, np.tile([0, 0, 10.0 if says else 0.0], (len(moved), 1)), atol=1e-9)
+    assert not says or f"named.txt: {says}" in found.messages
+
+
+def test_what_is_stated_of_control_is_not_of_the_source(files):
+    rows = "".join(f"p{k}.jpg,{UTM[0] + k},{UTM[1]},500,0,0,0\n" for k in range(4))
+    (files / "att.csv").write_text(f"name,X,Y,Z,yaw,pitch,roll\n{rows}")
+    (files / "yx.txt").write_text("c,1606000,717000,100\n")
+    stated = Statements(crs="EPSG:32647", columns="PNEZ", **dict.fromkeys(SIGMAS, (1.0, 1.0, 1.0)))
+    found = read_project(
+        Request(str(files / "att.csv"), "b", control=str(files / "yx.txt"), camera=SPEC, stated=stated)
+    )
+    assert found.block.gnss_ins.xyz[1].tolist() == [UTM[0] + 1, UTM[1], 500]
+    assert found.block.control.xyz.tolist() == [[717000, 1606000, 100]]
 
 
 def test_standard_deviations_that_files_lack(files):

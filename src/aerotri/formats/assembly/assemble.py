@@ -12,7 +12,7 @@ import numpy as np
 
 from aerotri.adjustment.track import exposure_times
 from aerotri.conventions import FilePath, InputError, counted, mm_from_px
-from aerotri.crs_text import refuse_other_system
+from aerotri.crs_text import plan_of, refuse_other_system
 from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.by_stamps import named_by_stamps
 from aerotri.formats.assembly.names_match import match_photographs
@@ -205,15 +205,18 @@ def with_orientations(reading: Reading, given: OrientationList, stated: Statemen
         orientations are to be observations beside others.
     """
     block = reading.block
-    if given.crs:
-        refuse_local(block, given.crs, given.path)
-        refuse_other_system(given.crs, block.crs, "the block", given.path)
     index, loosely = match_photographs(given.images, block.images.names)
     _refuse_strangers(given.images, index, block, given.path)
     said = _about_names(given.path.name, given.images, index, loosely, block.images.names)
     messages = [*reading.messages, *given.messages, *said]
     rows = np.flatnonzero(index >= 0)
     own = index[rows]
+    if given.crs:
+        # angles count from the axes of their plan: only heights can be brought to another system
+        refuse_local(block, given.crs, given.path)
+        refuse_other_system(plan_of(given.crs), plan_of(block.crs), "the block", given.path)
+        xyz, said = placing.near_in_crs(given.centre, given.crs, block.crs, stated.geoid, no_sigma(0), given.path)
+        given, messages = replace(given, centre=xyz), [*messages, *said]
     centre, rotation = block.images.centre.copy(), np.full((len(block.images), 3, 3), np.nan)
     centre[own] = given.centre[rows]
     if stated.linear_alteration_m is not None:
@@ -310,7 +313,8 @@ def with_positions(reading: Reading, given: PositionList, stated: Statements) ->
     elif given.crs:
         refuse_local(block, given.crs, given.path)
         near = np.vstack([block.control.xyz, block.images.centre])
-        xyz = placing.near_in_crs(xyz, given.crs, block.crs, stated.geoid, near, given.path)
+        xyz, said = placing.near_in_crs(xyz, given.crs, block.crs, stated.geoid, near, given.path)
+        messages += said
     elif given.heights and "+" in block.crs:
         xyz = placing.from_ellipsoidal_heights(xyz, block.crs, stated.geoid)
         messages.append(taken(f"{given.path.name}: ellipsoidal heights were brought to those of {block.crs}"))

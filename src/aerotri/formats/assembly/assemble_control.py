@@ -81,7 +81,7 @@ def with_control(reading: Reading, given: PointList, stated: Statements, may_be_
 
 def _in_block(
     block: Block, given: PointList, stated: Statements, flown: np.ndarray
-) -> tuple[np.ndarray, list[str]]:  # fmt: skip
+) -> tuple[np.ndarray, tuple[str, ...]]:  # fmt: skip
     """(k, 3) coordinates in the block's CRS, and what to say of it; flown (n, 3) m, where the photographs are."""
     if stated.control_heights not in HEIGHTS:
         raise InputError(
@@ -89,16 +89,16 @@ def _in_block(
         )
     if given.crs:
         refuse_local(block, given.crs, given.path)
-        return placing.near_in_crs(given.xyz, given.crs, block.crs, stated.geoid, flown, given.path), []
+        return placing.near_in_crs(given.xyz, given.crs, block.crs, stated.geoid, flown, given.path)
     if "ellipsoidal" in (stated.control_heights, given.heights) and "+" in block.crs:
         xyz = placing.from_ellipsoidal_heights(given.xyz, block.crs, stated.geoid)
-        return xyz, [taken(f"{given.path.name}: ellipsoidal heights were brought to those of {block.crs}")]
+        return xyz, (taken(f"{given.path.name}: ellipsoidal heights were brought to those of {block.crs}"),)
     if stated.control_heights == "ellipsoidal":
         raise InputError(
             f"--control-heights ellipsoidal is not needed: all heights of {block.crs} are ellipsoidal",
             "leave the option out, or name the height system in --crs, such as EPSG:25832+7837",
         )
-    return given.xyz, []
+    return given.xyz, ()
 
 
 def with_check_points(reading: Reading, names: tuple[str, ...], prefix: str = "") -> Reading:

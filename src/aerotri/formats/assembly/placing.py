@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -22,9 +23,9 @@ from aerotri.coordinates.georeference import (
 )
 from aerotri.coordinates.local_frame import LocalFrame, topocentric_frame
 from aerotri.coordinates.stated_systems import geographic_of
-from aerotri.crs_text import plan_of, system_in_words
+from aerotri.crs_text import heights_of, plan_of, system_in_words
 from aerotri.formats.assembly.oriented import OrientedBlock
-from aerotri.formats.assembly.parts import PointList, PositionList, Reading
+from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, Reading
 from aerotri.formats.foreign.ign import without_linear_alteration
 from aerotri.formats.text.notes import assumed, taken
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
@@ -65,11 +66,11 @@ def known_crs(crs: str) -> str:
     return crs.upper()
 
 
-def system_of_lists(lists: Sequence[PointList | PositionList]) -> str:
+def system_of_lists(lists: Sequence[PointList | PositionList | OrientationList]) -> str:
     """The system that a block gets from lists: the first that counts in metres, else UTM; '' where none names one."""
-    told = [part for part in lists if part.crs]
-    metric = [part for part in told if is_projected(plan_of(part.crs))]
-    return system_of_block(first.crs, first.xyz) if (first := next(iter(metric or told), None)) is not None else ""
+    told = [(part.crs, part.centre if isinstance(part, OrientationList) else part.xyz) for part in lists if part.crs]
+    metric = [(crs, xyz) for crs, xyz in told if is_projected(plan_of(crs))]
+    return next((system_of_block(crs, xyz) for crs, xyz in metric or told), "")
 
 
 def system_of_block(crs: str, xyz: np.ndarray) -> str:
@@ -373,8 +374,10 @@ def refuse_heights(names: np.ndarray, heights: np.ndarray, crs: str, highest: fl
 
 def near_in_crs(
     xyz: np.ndarray, source: str, target: str, geoid: FilePath | None, photographs: np.ndarray, file: os.PathLike[str]
-) -> np.ndarray:
-    """As `to_crs`, of points that lie near the photographs; longitude and latitude may be exchanged.
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """As `to_crs`, of points that lie near the photographs, and what to say of their heights.
+
+    Longitude and latitude may be exchanged.
 
     Parameters
     ----------
@@ -389,9 +392,20 @@ def near_in_crs(
         message = "lies near the photographs with longitude and latitude exchanged, not as it stands"
         raise InputError(message, OTHER_AXES, file)
     try:
-        return to_crs(xyz, source, target, geoid)
+        return to_crs(xyz, source, target, geoid), heights_in_words(source, target, file)
     except InputError as error:
         raise InputError(error.message, error.remedy, file) from error
+
+
+def heights_in_words(source: str, target: str, file: os.PathLike[str]) -> tuple[str, ...]:
+    """What to say of the heights of a file in the CRS `source`, brought to `target`, where one names none for them."""
+    named, wanted = heights_of(source), heights_of(target)
+    if bool(named) == bool(wanted):
+        return ()
+    name = Path(file).name
+    if wanted:
+        return (assumed(f"{name}: heights count as ellipsoidal, and were brought to those of {target}"),)
+    return (taken(f"{name}: heights of {source} were brought to ellipsoidal ones"),)
 
 
 def _is_near_exchanged(

@@ -142,23 +142,26 @@ def assembled(request: Request, sources: Sources) -> Reading:
     """As `read_project`, its source read in a way of one's own."""
     options = reading_options(request)
     whole = _whole(request, sources)
-    parts = _Parts() if whole is not None else _parts(request, options, sources)
+    of_source = options.beside_control() if request.control else options
+    parts = _Parts() if whole is not None else _parts(request, of_source, sources)
     reading = whole if whole is not None else _begin(request, parts)
     control = [*parts.control, *([kinds.read_control(request.control, options)] if request.control else [])]
-    positions = _positions(request, options, parts)
+    positions = parts.positions
+    if request.positions:
+        positions = kinds.read_position_list(request.positions, of_source, request.time_stamps)
+    orientations = [] if parts.orientations is None else [parts.orientations]
+    if request.orientation:
+        orientations.append(kinds.read_orientations(request.orientation, options))
     crs = request.stated.crs
     if not crs and reading.block.crs == "local":
-        crs = placing.system_of_lists([*control, *([positions] if positions else [])])
+        crs = placing.system_of_lists([*control, *([positions] if positions else []), *orientations])
     reading = with_crs(reading, crs, request.stated.geoid)
     extra = [kinds.read_rays(text, options) for text in request.image_points]
     of_control = [part.rays for part in control if part.rays is not None and part.rays.path not in parts.files]
     sigma_px = 1.0 if request.image_sigma_px is None else request.image_sigma_px
     for rays in (*parts.rays, *extra, *of_control):
         reading = with_rays(reading, rays, sigma_px)
-    if parts.orientations is not None:
-        reading = with_orientations(reading, parts.orientations, request.stated)
-    if request.orientation:
-        given = kinds.read_orientations(request.orientation, options)
+    for given in orientations:
         reading = with_orientations(reading, given, request.stated)
     if positions is not None:
         reading = with_positions(reading, positions, request.stated)
@@ -168,14 +171,6 @@ def assembled(request: Request, sources: Sources) -> Reading:
     if request.station_pattern:
         reading = _on_rig(reading, request)
     return _finished(reading, request, whole is None)
-
-
-def _positions(request: Request, options: ReadingOptions, parts: _Parts) -> PositionList | None:
-    """The positions of a list, or of the source."""
-    if not request.positions:
-        return parts.positions
-    own = options.beside_control() if request.control else options
-    return kinds.read_position_list(request.positions, own, request.time_stamps)
 
 
 def _on_rig(reading: Reading, request: Request) -> Reading:
