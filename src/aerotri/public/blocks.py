@@ -175,8 +175,9 @@ def read(
     orientation_sigma_deg : the same of ω, φ, κ, degrees.
     gnss_shift : estimate a shift of the GNSS positions, of the block or of every strip.
     geoid : grid of geoid undulations for heights of the coordinate system.
-    axes : 'yx' where lists that do not name their columns have Y, or the latitude, first; as the coordinate system has
-        them where None.
+    axes : 'yx' where lists that do not name their columns have Y, or the latitude, first; as their coordinate
+        system has them where None. Lists with an order of their own: X and Y change places, of the control points
+        alone where there are any.
     columns : of such a list of control points (of positions where there are none): letters such as 'PNEZD', or names
         separated by commas.
     offset : _offset.xyz of Pix4D, added to orientations.

@@ -81,8 +81,9 @@ def run(
     check : names of control points that become check points.
     control_sigma_m : σ of X, Y, Z, m, of control points without one; 0: without error, held.
     control_prefix : what image points have before the names of control points.
-    axes : 'yx' where lists that do not name their columns have Y, or the latitude, first; as the coordinate system has
-        them where None.
+    axes : 'yx' where lists that do not name their columns have Y, or the latitude, first; as their coordinate
+        system has them where None. Lists with an order of their own: X and Y change places, of the control points
+        alone where there are any.
     columns : of such a list of control points (of positions where there are none): letters such as 'PNEZD', or names
         separated by commas.
     positions : of the photographs, in place of EXIF; or a trajectory, or time stamps, see `aerotri.tie_points`.

@@ -218,8 +218,9 @@ def tie_points(
     geoid : grid of geoid undulations for its heights.
     control_sigma_m : σ of X, Y, Z, m, of control points without one; 0: without error, held.
     control_prefix : what image points have before the names of control points.
-    axes : 'yx' where lists that do not name their columns have Y, or the latitude, first; as the coordinate system has
-        them where None.
+    axes : 'yx' where lists that do not name their columns have Y, or the latitude, first; as their coordinate
+        system has them where None. Lists with an order of their own: X and Y change places, of the control points
+        alone where there are any.
     columns : of such a list of control points (of positions where there are none): letters such as 'PNEZD', or names
         separated by commas.
     time_stamps : when the photographs were taken, where `positions` is a trajectory: file .MRK of the drone, or a

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from aerotri.conventions import InputError
-from aerotri.formats.assembly.kinds import ReadingOptions, read_control, read_orientations, read_position_list
+from aerotri.formats.assembly.kinds import (
+    CONTROL,
+    ORIENTATIONS,
+    ReadingOptions,
+    kind_of,
+    read_control,
+    read_orientations,
+    read_position_list,
+)
 
 US_FOOT = 1200.0 / 3937.0
 GEOGRAPHIC = 'GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]]'
@@ -34,7 +42,7 @@ def test_feet_of_local_coordinates(control):
 
 SYSTEM_LINES = (
     "# CoordinateSystem: EPSG:2263", "# EPSG:2263", "# Coordinate system EPSG:2263", "# Horizontal CRS: EPSG:2263",
-    "#EPSG,2263",
+    "#EPSG,2263", "#CRS:EPSG:2263", "# crs=EPSG:2263", "# Coordinate system,EPSG:2263", "# SRS, EPSG:2263",
 )  # fmt: skip
 
 
@@ -53,6 +61,62 @@ def test_comments_that_name_a_system(control, line, header):
 def test_the_column_of_heights_says_what_it_counts_in(control, unit, factor):
     found = control(f"# CRS: EPSG:2263\nname,X,Y,Z ({unit})\nA,1000,2000,30\n")
     np.testing.assert_allclose(found.xyz, [[1000 * US_FOOT, 2000 * US_FOOT, 30 * factor]], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "prose",
+    [
+        "Projection centres of the photographs", "Coordinate system is unknown", "projection method: manual",
+        "CRS, as the office has it",
+    ],
+)  # fmt: skip
+def test_prose_names_no_system(control, prose):
+    found = control(f"# {prose}\nname,X,Y,Z\nA,1,2,3\n")
+    assert (found.crs, found.messages) == ("", (f"list.csv:1: '# {prose}' is not used",))
+    with pytest.raises(InputError, match="'WGS 99' is not known"):
+        control("# CRS: WGS 99\nname,X,Y,Z\nA,1,2,3\n")
+
+
+OPK_ROW = "P1 500000 5600000 1000 1 2 3\n"
+
+
+@pytest.mark.parametrize(
+    ("comment", "row", "kinds", "kind"),
+    [
+        ("coordinates X Y Z in metres", "P1,500000,5600000,100,0.02,0.03\n", CONTROL, "pix4d-gcp"),
+        ("coordinates X Y Z in metres", "P1, 500000, 5600000, 100, 0.02, 0.03\n", CONTROL, "pix4d-gcp"),
+        ("points X Y and Z", "P1,500000,5600000,100\n", CONTROL, "pix4d-gcp"),
+        ("X, Y, Z in metres, then omega, phi, kappa", OPK_ROW, ORIENTATIONS, "opk-list"),
+        ("name, X, Y, Z, omega, phi, kappa", OPK_ROW, ORIENTATIONS, "opk-csv"),
+        ("name X Y Z omega phi kappa", OPK_ROW, ORIENTATIONS, "opk-csv"),
+        ("name, X, Y, Z", "P1\t500000\t5600000\t100\t\n", CONTROL, "csv"),
+        ("name X Y Z", "P1 500000,5 5600000,5 100,5\n", CONTROL, "csv"),
+    ],
+)
+def test_comments_name_the_columns_where_they_are_as_many(tmp_path, comment, row, kinds, kind):
+    (tmp_path / "list.txt").write_text(f"# {comment}\n{row}")
+    assert kind_of(tmp_path / "list.txt", kinds) == kind
+    read = read_control if kinds is CONTROL else read_orientations
+    found = read(str(tmp_path / "list.txt"), ReadingOptions())
+    np.testing.assert_allclose(
+        getattr(found, "xyz" if kinds is CONTROL else "centre")[0, :2], [500000, 5600000], atol=1
+    )
+
+
+@pytest.mark.parametrize("options", [{}, {"crs": "EPSG:32632"}])
+@pytest.mark.parametrize("read", [read_control, read_position_list])
+def test_order_of_axes_of_the_system_that_a_comment_names(tmp_path, read, options):
+    (tmp_path / "list.csv").write_text("# CRS: EPSG:4326\nP1,50.1,8.6,100\n")
+    assert read(str(tmp_path / "list.csv"), ReadingOptions(**options)).xyz.tolist() == [[8.6, 50.1, 100]]
+    assert read(str(tmp_path / "list.csv"), ReadingOptions(axes="xy")).xyz.tolist() == [[50.1, 8.6, 100]]
+
+
+@pytest.mark.parametrize("kind", ["pix4d-gcp", "odm-gcp", "patb-con"])
+def test_columns_of_a_format_are_not_stated(tmp_path, kind):
+    (tmp_path / "list.csv").write_text("P1,1,2,3\n")
+    with pytest.raises(InputError, match=f"the columns of {kind} are known") as caught:
+        read_control(f"{kind}:{tmp_path / 'list.csv'}", ReadingOptions(columns="PNEZ"))
+    assert "csv:list.csv" in caught.value.remedy
 
 
 def test_titles_above_the_names_of_the_columns(control):
@@ -132,7 +196,12 @@ def test_tabs_without_cells_and_names_beside_numbers(control):
 
 
 def test_axes_of_named_lists(control):
-    assert control("name,X,Y,Z\nA,1,2,3\n", exchanged=True).xyz.tolist() == [[2, 1, 3]]
+    """Never without a word."""
+    found = control("name,Easting,Northing,Z\nA,1,2,3\n", exchanged=True)
+    assert found.xyz.tolist() == [[2, 1, 3]]
+    assert found.messages == ("list.csv: 'Easting' and 'Northing' change places, as --axes yx states",)
+    found = control("EPSG:4326\n48 11 500 1 2 a.jpg A\n", exchanged=True)
+    assert "list.csv: X and Y change places, as --axes yx states" in found.messages
 
 
 def test_sigma_counts_as_its_coordinate(control):
@@ -140,6 +209,14 @@ def test_sigma_counts_as_its_coordinate(control):
     np.testing.assert_allclose(found.sigma, US_FOOT)
     found = control("# CRS: EPSG:2263+6360\nname,X,Y,Z,accuracy (m)\nA,1,2,3,1\n")
     np.testing.assert_allclose(found.sigma, 1.0)
+    for plan, height in (("lon,lat", "Altitude"), ("X (ft),Y (ft)", "Ellipsoidal Height"), ("lon,lat", "hae")):
+        found = control(f"name,{plan},{height} (ft),sX,sY,sZ\nA,8,50,3,1,1,1\n")
+        np.testing.assert_allclose(found.sigma, [[1.0, 1.0, 0.3048] if "lon" in plan else [0.3048] * 3])
+
+
+def test_decimal_commas_are_none_of_names(control):
+    found = control("name;X;Y;Z\n1,5;8,1;50;1000\n")
+    assert (found.points.tolist(), found.xyz.tolist()) == (["1,5"], [[8.1, 50, 1000]])
 
 
 def test_many_columns_are_counted(control):

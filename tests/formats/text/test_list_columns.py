@@ -1,9 +1,13 @@
 """Names of columns as programs and people write them."""
 
+import re
+
 import numpy as np
 import pytest
 
-from aerotri.formats.text.list_columns import list_column
+from aerotri.conventions import InputError
+from aerotri.formats.foreign.named_lists import read_control_list
+from aerotri.formats.text.list_columns import is_unit, list_column, looks_like_unit
 
 US_FOOT = 1200.0 / 3937.0
 KNOWN = {
@@ -35,6 +39,7 @@ def test_meanings(meaning, names):
         ("Easting (ft)", "X", 0.3048), ("Northing [US survey feet]", "Y", US_FOOT), ("Elev_ftUS", "Z", US_FOOT),
         ("Z [mm]", "Z", 1e-3), ("Height (m)", "Z", 1.0), ("E_usft", "X", US_FOOT), ("sigma_Z (cm)", "sZ", 1e-2),
         ("Kappa [gon]", "kappa", 0.9), ("Omega (rad)", "omega", np.degrees(1.0)), ("X (deg)", "lon", 1.0),
+        ("X (US survey ft)", "X", US_FOOT), ("X (survey foot)", "X", US_FOOT),
         ("latitude [decimal degrees]", "lat", 1.0), ("Accuracy_(deg)", "", 1.0),
     ],
 )  # fmt: skip
@@ -42,6 +47,25 @@ def test_units(name, meaning, factor):
     found = list_column(name)
     assert found.meaning == meaning
     assert found.factor == pytest.approx(factor)
+
+
+def test_units_of_the_remedy_are_known(tmp_path):
+    (tmp_path / "list.csv").write_text("name,X (yd),Y,Z\nA,1,2,3\n")
+    with pytest.raises(InputError) as caught:
+        read_control_list(tmp_path / "list.csv")
+    units = re.findall(r"\(([^)]*)\)", caught.value.remedy)
+    assert len(units) > 3
+    assert all(map(is_unit, units))
+
+
+@pytest.mark.parametrize("text", ["in feet", "ft US", "INTFT", "yards", "ddmmss", "arcsec", "deg min sec", "2 sigma"])
+def test_units_that_are_not_known(text):
+    assert looks_like_unit(text)
+
+
+@pytest.mark.parametrize("text", ["after adjustment", "section 3", "shift", "admin", "footprint", "sigmar", "draft"])
+def test_words_that_are_no_units(text):
+    assert not looks_like_unit(text)
 
 
 @pytest.mark.parametrize("name", ["Latitude (m)", "Z (varas)", "Höhe (NHN)", "Yaw (ft)"])

@@ -45,7 +45,7 @@ class Statements:
         projection; None where they are not.
     patb_rotation : meaning of the matrices of an .ori file, see `patb.ROTATIONS`.
     axes : 'xy' or 'yx', the order of coordinates in lists that do not name them; None: as the system has them.
-    columns : of such a list, see `named_lists.stated_columns`: of the control points, of positions where there are
+    columns : of such a list, see `list_header.stated_columns`: of the control points, of positions where there are
         none.
     """
 

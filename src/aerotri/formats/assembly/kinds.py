@@ -53,21 +53,23 @@ class ReadingOptions:
 
     Parameters
     ----------
-    axes : 'xy' or 'yx', the order of coordinates in lists that do not name them.
-    exchanged : whether the user says that X and Y stand in the other order where a list has a usual one.
+    axes : 'xy' or 'yx', the order of coordinates in lists that do not name them; None: as their system has it.
+    crs : of such lists where they name none.
+    exchanged : whether the user says that X and Y stand in the other order where a list has one.
     offset : (3,) m, added to orientations of Pix4D; None: nothing.
     patb_rotation : see `patb.ROTATIONS`; None: settled by reprojection.
-    columns : of a list that does not name them, see `named_lists.stated_columns`; '' where it does.
+    columns : of a list that does not name them, see `list_header.stated_columns`; '' where it does.
     """
 
-    axes: str = "xy"
+    axes: str | None = None
+    crs: str = ""
     exchanged: bool = False
     offset: np.ndarray | None = None
     patb_rotation: str | None = None
     columns: str = ""
 
     def __post_init__(self) -> None:
-        if self.axes not in AXES:
+        if self.axes is not None and self.axes not in AXES:
             raise InputError(f"--axes '{self.axes}' is not possible", "give xy or yx")
         if self.patb_rotation is not None and self.patb_rotation not in ROTATIONS:
             raise InputError(
@@ -76,7 +78,10 @@ class ReadingOptions:
         stated_columns(self.columns)
 
     def beside_control(self) -> ReadingOptions:
-        """For a list of positions where there is one of control, whose columns these are."""
+        """For another list than that of control, whose columns these are.
+
+        What the user states of the order counts there only where the list has none of its own.
+        """
         return replace(self, columns="", exchanged=False)
 
 
@@ -106,14 +111,14 @@ POSITIONS: Kinds = {
     "grafnav": (TRAJECTORIES["grafnav"][0], lambda path, _: events(read_grafnav(path))),
     "odm-geo": (is_odm_geo, lambda path, options: read_odm_geo(path, options.exchanged)),
     "csv": (is_named_list, lambda path, options: read_positions(path, options.columns, options.exchanged)),
-    "pix4d-geo": (is_pix4d_geo, lambda path, options: read_pix4d_geo(path, options.axes)),
+    "pix4d-geo": (is_pix4d_geo, lambda path, options: read_pix4d_geo(path, options.axes, options.crs)),
 }
 CONTROL: Kinds = {
     "metashape-markers": (is_metashape_markers, lambda path, _: read_metashape_markers(path)),
     "opensfm-gcp": (is_opensfm_gcp, lambda path, _: read_opensfm_gcp(path)),
     "odm-gcp": (is_odm_gcp, lambda path, options: read_odm_gcp(path, options.exchanged)),
     "csv": (is_named_list, lambda path, options: read_control_list(path, options.columns, options.exchanged)),
-    "pix4d-gcp": (is_pix4d_gcp, lambda path, options: read_pix4d_gcp(path, options.axes)),
+    "pix4d-gcp": (is_pix4d_gcp, lambda path, options: read_pix4d_gcp(path, options.axes, options.crs)),
     "ign-app": (is_ign_app, lambda path, _: read_ign_app(path)),
     "patb-con": (is_patb_con, lambda path, _: read_patb_con(path)),
 }
@@ -149,6 +154,9 @@ def stated_or_told(text: str, kinds: Kinds, options: ReadingOptions) -> tuple[st
         When there is no such file.
     """
     stated, path = split_kind(text, kinds)
+    if stated not in (None, "csv") and options.columns and "csv" in kinds:
+        remedy = f"leave --columns out, or put csv before the path: csv:{path.name}"
+        raise InputError(f"--columns is given, and the columns of {stated} are known", remedy, path)
     return stated or ("csv" if options.columns and "csv" in kinds else kind_of(path, kinds)), path
 
 
@@ -259,21 +267,12 @@ def read_control(text: str, options: ReadingOptions) -> PointList:
 
 
 def options_of(stated: Statements, offset: np.ndarray | None = None) -> ReadingOptions:
-    """What the user states of lists, with the order of axes that the coordinate system has where he does not.
+    """What the user states of lists.
 
     Raises
     ------
     InputError
         When what is stated makes no sense.
     """
-    axes = axes_of(stated.crs) if stated.axes is None else stated.axes
-    return ReadingOptions(axes, stated.axes == "yx", offset, stated.patb_rotation, stated.columns)
-
-
-def axes_of(crs: str) -> str:
-    """The usual order in lists without names: east before north, but latitude before longitude."""
-    from aerotri.coordinates.georeference import georeference
-
-    if not crs or crs == "local":
-        return "xy"
-    return "xy" if georeference(crs.partition("+")[0], np.zeros((0, 3))).is_projected else "yx"
+    exchanged = stated.axes == "yx"
+    return ReadingOptions(stated.axes, stated.crs, exchanged, offset, stated.patb_rotation, stated.columns)

@@ -101,12 +101,39 @@ def header_of(lines: Sequence[str], columns: str = "") -> Header | None:
         *range(data - 1, -1, -1),
         *range(data + 1, len(lines))[:TITLES],
     ):
-        line = lines[number].lstrip("# ")
-        separator = _separator(line)
-        found = tuple(map(list_column, cells(line, separator)[: MOST_COLUMNS + 1]))
-        if sum(column.meaning in COORDINATES for column in found) > 1:
-            return Header(_with_one_name(found), separator, number)
+        for names, separator in _ways_to_split(lines, number, data):
+            found = tuple(map(list_column, names[: MOST_COLUMNS + 1]))
+            if sum(column.meaning in COORDINATES for column in found) > 1:
+                return Header(_with_one_name(found), separator, number)
     return None
+
+
+def _ways_to_split(lines: Sequence[str], number: int, data: int) -> list[tuple[list[str], str | None]]:
+    """Names in a line, and what separates the cells of the rows; a comment names columns if these are as many.
+
+    Parameters
+    ----------
+    data : the first line that is no comment.
+    """
+    line = lines[number].lstrip("# ")
+    own = _separator(line)
+    if number >= data or data == len(lines):
+        return [(cells(line, own), own)]
+    rows, found = lines[data : data + TITLES], []
+    of_rows = _separator(rows[0])
+    for of_names, separator in ((own, own), (of_rows, of_rows), (own, of_rows)):
+        names = cells(line, of_names)
+        # words of a sentence are no names of columns that something else separates
+        if (of_names or separator is None) and any(_is_row_of(row, separator, len(names)) for row in rows):
+            found.append((names, separator))
+    return found
+
+
+def _is_row_of(line: str, separator: str | None, count: int) -> bool:
+    """Whether a line has as many cells, empty ones behind them aside; blanks behind commas separate nothing."""
+    words = cells(line, separator)
+    parted = separator is not None or not any(word.endswith(tuple(SEPARATORS)) for word in words)
+    return parted and len(words) >= count and not any(words[count:])
 
 
 def _with_one_name(columns: tuple[ListColumn, ...]) -> tuple[ListColumn, ...]:

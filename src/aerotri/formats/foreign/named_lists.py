@@ -21,6 +21,7 @@ from aerotri.crs_text import plan_of
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, texts
 from aerotri.formats.foreign.list_header import Header, cells, check_header, header_of, rows_below
 from aerotri.formats.foreign.list_systems import (
+    exchange_in_words,
     in_words,
     one_system,
     order_of_axes,
@@ -38,6 +39,8 @@ NO_NUMBER = ("", "nan", "-", "--", "n/a", "#n/a", "none", "null")
 """What stands where nothing is known, in small letters."""
 MOST_NAMED = 30
 """Columns that are named where they are not carried over [C]."""
+TEXTS = ("name", "role", "crs")
+"""Meanings of columns that hold no numbers."""
 SIGMAS = ("sX", "sY", "sZ", "s_plan", "s_height", "s_all")
 
 
@@ -69,10 +72,11 @@ class _List:
         column = next((column for column in self.header if column.meaning == name), None)
         if column is not None and column.unit and np.isfinite(column.factor):
             return column.factor
-        axis = {"sX": "X", "sY": "Y", "s_plan": "X", "s_all": "X", "sZ": "Z", "s_height": "Z"}.get(name)
-        if axis is not None:
-            # a σ without a unit of its own counts as its coordinate does
-            return self._factor(axis) if {"X", "Y"} & set(self.columns) else 1.0
+        # a σ without a unit of its own counts as its coordinate does, beside degrees in metres
+        if name in ("sZ", "s_height"):
+            return self._factor(self.heights)
+        if name in ("sX", "sY", "s_plan", "s_all"):
+            return self._factor("Y" if name == "sY" else "X") if {"X", "Y"} & set(self.columns) else 1.0
         if name in ("X", "Y"):
             return self.system.plan_to_metre
         return self.system.height_to_metre if name in ("Z", "h_ell") else 1.0
@@ -81,6 +85,11 @@ class _List:
     def is_plane(self) -> bool:
         """Whether X and Y are used, not longitude and latitude."""
         return bool({"X", "Y"} & set(self.columns)) or not {"lon", "lat"} <= set(self.columns)
+
+    @property
+    def heights(self) -> str:
+        """The column of heights that is used: with longitude and latitude the ellipsoidal one, if there are two."""
+        return "h_ell" if "h_ell" in self.columns and ("Z" not in self.columns or not self.is_plane) else "Z"
 
 
 def _read(path: Path, columns: str = "") -> _List:
@@ -99,11 +108,11 @@ def _read(path: Path, columns: str = "") -> _List:
         if len(words[row]) != len(header.columns):
             message = f"the row has {len(words[row])} cells, the header has {len(header.columns)}"
             raise everything.error(row, message, "give every row all columns; is the file cut off?")
-    if header.separator != ",":
-        words = _with_points(words)
     by_meaning = {
         column.meaning: [words[row][i] for row in rows] for i, column in enumerate(header.columns) if column.meaning
     }
+    if header.separator != ",":
+        by_meaning |= {name: list(map(_with_point, by_meaning[name])) for name in by_meaning if name not in TEXTS}
     system, notes = _system(everything, header, by_meaning)
     above = [line for line in everything.lines[: header.line or 0] if not line.startswith("#")]
     titles = (left_behind(f"{path.name}: '{line[:60]}' above the names of the columns is not used") for line in above)
@@ -118,12 +127,9 @@ def _without_surplus(file: TextFile, row: int, header: Header) -> list[str]:
     return words
 
 
-def _with_points(words: dict[int, list[str]]) -> dict[int, list[str]]:
-    """Numbers with a decimal comma as such with a point."""
-    comma = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
-    return {
-        row: [word.replace(",", ".") if comma.fullmatch(word) else word for word in line] for row, line in words.items()
-    }
+def _with_point(word: str) -> str:
+    """A number with a decimal comma as one with a point."""
+    return word.replace(",", ".") if re.fullmatch(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?", word) else word
 
 
 def _system(file: TextFile, header: Header, columns: dict[str, list[str]]) -> tuple[StatedSystem, tuple[str, ...]]:
@@ -166,16 +172,8 @@ def _coordinates(found: _List) -> tuple[np.ndarray, str, str]:
     names, crs = ("X", "Y") if found.is_plane else ("lon", "lat"), found.system.crs
     if not found.is_plane and crs and is_projected(plan_of(crs)):
         crs = geographic_of(crs)
-    height = _height_column(found)
-    if height == "h_ell":
-        return found.numbers(*names, height), plan_of(crs), "ellipsoidal"
-    return found.numbers(*names, height), crs, ""
-
-
-def _height_column(found: _List) -> str:
-    """The column of heights that is used: with longitude and latitude the ellipsoidal one, if there are two."""
-    given = found.columns
-    return "h_ell" if "h_ell" in given and ("Z" not in given or not found.is_plane) else "Z"
+    xyz = found.numbers(*names, found.heights)
+    return (xyz, plan_of(crs), "ellipsoidal") if found.heights == "h_ell" else (xyz, crs, "")
 
 
 def _sigma(found: _List, may_be_zero: bool = False) -> tuple[np.ndarray, tuple[str, ...]]:
@@ -199,13 +197,19 @@ def _sigma(found: _List, may_be_zero: bool = False) -> tuple[np.ndarray, tuple[s
 
 def _messages(found: _List, *used: str) -> tuple[str, ...]:
     """What was read in another way than it stands there, and the columns that were not."""
-    used_now = {"name", "X", "Y", "crs", _height_column(found), *SIGMAS, *used}
+    used_now = {"name", "X", "Y", "crs", found.heights, *SIGMAS, *used}
     used_now |= set() if found.is_plane else {"lon", "lat"}
     left = [column.name for column in found.header if column.name and column.meaning not in used_now]
     shown = ", ".join(name[:40] for name in left[:MOST_NAMED])
     more = f" and {len(left) - MOST_NAMED} more" if len(left) > MOST_NAMED else ""
     said = left_behind(f"{found.file.path.name}: columns not carried over: {shown}{more}")
     return (*found.notes, *((said,) if left else ()))
+
+
+def _exchange(found: _List, exchanged: bool) -> tuple[str, ...]:
+    axes = ("X", "Y") if found.is_plane else ("lon", "lat")
+    names = [column.name for axis in axes for column in found.header if column.meaning == axis]
+    return exchange_in_words(exchanged, found.file.path, [f"'{name}'" for name in names])
 
 
 def read_positions(path: FilePath, columns: str = "", exchanged: bool = False) -> PositionList:
@@ -230,7 +234,7 @@ def read_positions(path: FilePath, columns: str = "", exchanged: bool = False) -
     angles = np.radians(found.numbers("yaw", "pitch", "roll"))
     angles[np.isnan(angles).any(axis=1)] = np.nan
     sigma, said = _sigma(found)
-    messages = (*_messages(found, "yaw", "pitch", "roll"), *said)
+    messages = (*_messages(found, "yaw", "pitch", "roll"), *said, *_exchange(found, exchanged))
     order = order_of_axes(exchanged)
     return PositionList(found.file.path, names, xyz[:, order], sigma[:, order], angles, crs, messages, heights)
 
@@ -264,7 +268,7 @@ def read_control_list(path: FilePath, columns: str = "", exchanged: bool = False
     order = order_of_axes(exchanged)
     return PointList(
         found.file.path, names, xyz[:, order], sigma[:, order], roles == "check", crs, heights=heights,
-        messages=(*_messages(found, "role"), *said),
+        messages=(*_messages(found, "role"), *said, *_exchange(found, exchanged)),
     )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from aerotri.coordinates.stated_systems import StatedSystem, stated_system
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.parts import PointList, PositionList, RayList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
-from aerotri.formats.foreign.list_systems import in_words, order_of_axes, refuse_unknown_heights
+from aerotri.formats.foreign.list_systems import exchange_in_words, in_words, order_of_axes, refuse_unknown_heights
 from aerotri.formats.text.notes import assumed, left_behind
 from aerotri.formats.text.sigmas import REMEDY, impossible_sigmas, why_impossible
 from aerotri.formats.text.text_lines import TextFile, check_words, first_lines, is_number
@@ -146,7 +146,7 @@ def read_odm_gcp(path: FilePath, exchanged: bool = False) -> PointList:
             unit="px",
             focal_length_mm=np.full(len(image_place), np.nan),
         ),
-        messages=(*messages, *_about_heights(file.path, xyz[:, 2], "point")),
+        messages=(*messages, *exchange_in_words(exchanged, file.path), *_about_heights(file.path, xyz[:, 2], "point")),
     )
 
 
@@ -225,7 +225,11 @@ def read_odm_geo(path: FilePath, exchanged: bool = False) -> PositionList:
     angles = np.radians(values[:, 3:6])
     angles[np.isnan(angles).any(axis=1)] = np.nan
     there = ~np.isnan(values[:, 2])
-    said = [*messages, *_about_heights(file.path, values[there, 2], "photograph")]
+    said = [
+        *messages,
+        *exchange_in_words(exchanged, file.path),
+        *_about_heights(file.path, values[there, 2], "photograph"),
+    ]
     if not there.all():
         about = f"{file.path.name}: {counted(int((~there).sum()), 'position')} without height left out"
         said.append(left_behind(about))

@@ -19,7 +19,7 @@ from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.foreign.list_header import is_named
-from aerotri.formats.foreign.list_systems import order_of_axes, refuse_unknown_heights, system_above
+from aerotri.formats.foreign.list_systems import axes_of, order_of_axes, refuse_unknown_heights, system_above
 from aerotri.formats.text.notes import assumed
 from aerotri.formats.text.sigmas import REMEDY, impossible_sigmas, why_impossible
 from aerotri.formats.text.text_lines import TextFile, all_numbers, check_words, first_lines
@@ -98,12 +98,13 @@ def read_pix4d_offset(path: FilePath) -> np.ndarray:
     return file.values(words[0], [0, 0, 0], "offset")
 
 
-def read_pix4d_gcp(path: FilePath, axes: str = "xy") -> PointList:
+def read_pix4d_gcp(path: FilePath, axes: str | None = None, crs: str = "") -> PointList:
     """Ground control points.
 
     Parameters
     ----------
-    axes : 'xy' when c1 is X (east, longitude), 'yx' when it is Y (north, latitude).
+    axes : 'xy' when c1 is X (east, longitude), 'yx' when it is Y (north, latitude); None: as the system has them that
+        a comment names, or else `crs`.
 
     Raises
     ------
@@ -111,18 +112,17 @@ def read_pix4d_gcp(path: FilePath, axes: str = "xy") -> PointList:
         With the line.
     """
     file, names, values = _rows(Path(path), GCP_WIDTHS, "label,c1,c2,z, then acc_h,acc_v or not", "point")
-    xyz, crs, said = _placed(file, values[:, :3], axes)
+    xyz, crs, messages = _placed(file, values, axes, crs)
     sigma = _spread(file, values[:, 3:], may_be_zero=True)
-    messages = (*_guessed(file, values, axes), *said)
     return PointList(file.path, texts(names), xyz, sigma, np.zeros(len(names), bool), crs, messages=messages)
 
 
-def read_pix4d_geo(path: FilePath, axes: str = "xy") -> PositionList:
+def read_pix4d_geo(path: FilePath, axes: str | None = None, crs: str = "") -> PositionList:
     """Positions of photographs, with yaw, pitch and roll where the file has them.
 
     Parameters
     ----------
-    axes : as in `read_pix4d_gcp`.
+    axes, crs : as in `read_pix4d_gcp`.
 
     Raises
     ------
@@ -134,19 +134,25 @@ def read_pix4d_geo(path: FilePath, axes: str = "xy") -> PositionList:
     has_angles = values.shape[1] > 5
     angles = np.radians(values[:, 3:6]) if has_angles else no_sigma(len(names))
     sigma = _spread(file, values[:, 6 if has_angles else 3 :])
-    xyz, crs, said = _placed(file, values[:, :3], axes)
-    messages = (*_guessed(file, values, axes, has_angles), *said)
+    xyz, crs, messages = _placed(file, values, axes, crs, has_angles)
     return PositionList(file.path, texts(names), xyz, sigma, angles, crs, messages)
 
 
-def _placed(file: TextFile, values: np.ndarray, axes: str) -> tuple[np.ndarray, str, tuple[str, ...]]:
-    """(n, 3) m in the order X, Y, Z, the system that a comment names, and what to say of it."""
+def _placed(
+    file: TextFile, values: np.ndarray, axes: str | None, crs: str, has_angles: bool = False
+) -> tuple[np.ndarray, str, tuple[str, ...]]:
+    """(n, 3) m in the order X, Y, Z, the system that a comment names, and what to say of the list."""
     system, said = system_above(file.path)
     refuse_unknown_heights(file, system, values[:, 2])
-    return _ordered(values, axes) * system.to_metre, system.crs, said
+    axes = axes_of(system.crs or crs) if axes is None else axes
+    return (
+        _ordered(values[:, :3], axes) * system.to_metre,
+        system.crs,
+        (*_guessed(file, values, axes, has_angles), *said),
+    )
 
 
-def _guessed(file: TextFile, values: np.ndarray, axes: str, has_angles: bool = False) -> tuple[str, ...]:
+def _guessed(file: TextFile, values: np.ndarray, axes: str, has_angles: bool) -> tuple[str, ...]:
     """How the columns were taken, which no line of the file names."""
     accuracies = {1: ("accuracy",), 2: ("accuracy in plan", "accuracy of the height")}
     left = values.shape[1] - (6 if has_angles else 3)

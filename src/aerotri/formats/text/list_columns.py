@@ -80,13 +80,20 @@ LENGTHS = {
     "m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3,
     "ft": 0.3048, "foot": 0.3048, "feet": 0.3048, "ift": 0.3048, "intft": 0.3048, "internationalfeet": 0.3048,
     "usft": US_FOOT, "ftus": US_FOOT, "sft": US_FOOT, "ussurveyfoot": US_FOOT, "ussurveyfeet": US_FOOT,
-    "surveyfeet": US_FOOT, "usfeet": US_FOOT, "usfoot": US_FOOT,
+    "ussurveyft": US_FOOT, "surveyft": US_FOOT, "surveyfoot": US_FOOT, "surveyfeet": US_FOOT, "usfeet": US_FOOT,
+    "usfoot": US_FOOT,
 }  # fmt: skip
 ANGLES = {
     "deg": 1.0, "degree": 1.0, "degrees": 1.0, "decimaldegrees": 1.0, "°": 1.0, "dd": 1.0,
     "grad": 0.9, "gon": 0.9, "gons": 0.9, "grads": 0.9,
     "rad": float(np.degrees(1.0)), "radian": float(np.degrees(1.0)), "radians": float(np.degrees(1.0)),
 }  # fmt: skip
+UNIT_WORD = re.compile(
+    r"(?<![a-z])(?:(?:us|s|intl?)?(?:ft|foot|feet)(?:us|intl?)?|inch(?:es)?|yds?|yards?|dmm?s?|(?:arc)?secs?|sigma)(?![a-z])"
+    r"|mmss|seconds|%|σ|^[WS]$",
+    re.IGNORECASE,
+)
+"""Words of units, sides and standard deviations that are not known here."""
 IN_DEGREES = ("lon", "lat", "omega", "phi", "kappa", "yaw", "pitch", "roll")
 IN_METRES = ("X", "Y", "Z", "h_ell", "sX", "sY", "sZ", "s_plan", "s_height", "s_all")
 
@@ -134,7 +141,7 @@ def list_column(name: str) -> ListColumn:
 
 def looks_like_unit(text: str) -> bool:
     """Whether a text in brackets that is no unit here states one, a side, or how sure a value is."""
-    return re.search(r"f(?:ee|oo)?t|inch|yd|yard|\bdm|mmss|sec|%|σ|sigma|^[WS]$", text, re.IGNORECASE) is not None
+    return UNIT_WORD.search(text) is not None
 
 
 def is_unit(text: str) -> bool:
