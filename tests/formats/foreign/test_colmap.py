@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from oriented_sample import oriented_sample
 
+import aerotri
 from aerotri.conventions import InputError, mm_from_px, px_from_mm
 from aerotri.formats.assembly.oriented import OrientedBlock, oriented_block, oriented_from_adjusted
 from aerotri.formats.foreign.colmap import colmap_camera, point_numbers, read_colmap, write_colmap
@@ -324,3 +326,17 @@ def test_blocks_without_orientation_are_refused():
         oriented_block(nowhere, points)
     with pytest.raises(InputError, match="not those of the block"):
         oriented_block(block, points[:-1])
+
+
+def test_a_model_without_points(tmp_path):
+    """Photographs, orientations and cameras are start values; that image points are missing is said."""
+    oriented = oriented_sample()
+    write_colmap(oriented, tmp_path / "x", binary=False)
+    rows = [line for line in (tmp_path / "x" / "images.txt").read_text().splitlines() if not line.startswith("#")]
+    (tmp_path / "x" / "images.txt").write_text("\n\n".join(rows[::2]) + "\n\n")
+    (tmp_path / "x" / "points3D.txt").write_text("")
+    reading = aerotri.read(tmp_path / "x", pixel_um=5.0)
+    assert any("no points that were measured" in text for text in reading.messages)
+    assert len(reading.block.image_points) == 0
+    order = [reading.block.images.names.tolist().index(name) for name in oriented.block.images.names.tolist()]
+    np.testing.assert_allclose(reading.block.images.centre[order], oriented.centre, rtol=0, atol=1e-9)

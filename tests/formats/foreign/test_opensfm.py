@@ -216,3 +216,20 @@ def test_errors_of_tracks(folder, tracks, line, says):
     with pytest.raises(InputError, match=re.escape(says)) as caught:
         read_opensfm(folder(tracks=tracks))
     assert caught.value.line == line
+
+
+@pytest.mark.parametrize("change", ["empty", "missing"])
+def test_orientations_without_object_points(tmp_path, change):
+    """The tracks are points all the same; the adjustment places them."""
+    oriented = oriented_sample()
+    write_opensfm(oriented, tmp_path / "x")
+    content = json.loads((tmp_path / "x" / "reconstruction.json").read_text())
+    content[0] |= {"points": {}}
+    if change == "missing":
+        del content[0]["points"]
+    (tmp_path / "x" / "reconstruction.json").write_text(json.dumps(content))
+    reading = read_opensfm(tmp_path / "x", 5.0)
+    assert len(reading.block.image_points) == len(oriented.block.image_points)
+    assert reading.points is not None
+    assert np.isnan(reading.points).all()
+    assert "holds no object points: those of tracks.csv are placed anew" in reading.messages

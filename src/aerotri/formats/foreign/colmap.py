@@ -17,6 +17,7 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted, px_from_mm
 from aerotri.formats.assembly.oriented import OrientedBlock
+from aerotri.formats.assembly.parts import no_sigma
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.foreign._colmap_kernels import mark_repeated, number_by_appearance
 from aerotri.formats.foreign.colmap_arrays import FILES, ModelArrays, read_arrays
@@ -26,11 +27,11 @@ from aerotri.formats.foreign.colmap_model import (
     bare_model,
     block_without_rays,
     image_point_mm,
-    no_measured_points,
     open_model,
     refuse_far,
     refuse_no_colmap,
     refuse_unknown,
+    warn_of_no_points,
     warn_of_repeated,
 )
 from aerotri.formats.foreign.colmap_rigs import (
@@ -70,12 +71,15 @@ def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndar
     -----
     UserWarning
         When an object point is measured more than once in one image; the first measurement is kept. When a lens is
-        held, or fitted to a model of other formulas.
+        held, or fitted to a model of other formulas. When no point is measured: photographs and cameras are read.
     """
     folder = Path(folder)
     model, arrays = _opened(folder)
     ids = sorted(model.images)
     bare = block_without_rays(model, ids, pixel_um, folder)
+    if not any(len(point) for _, point in arrays.images.values()):
+        warn_of_no_points()
+        return bare, no_sigma(0)
     image, point_id, xy = _rays_of(arrays, ids, bare.images, bare.cameras, folder)
     numbers, point = _by_appearance(point_id)
     keep = _once_each(image, point, len(numbers))
@@ -100,8 +104,6 @@ def _rays_of(
     """Image (m,), number of the object point (m,) and position (m, 2) mm of every ray, image by image."""
     parts = [arrays.images[number] for number in ids]
     ends = np.cumsum([0, *(len(point) for _, point in parts)])
-    if not ends[-1]:
-        raise no_measured_points(folder)
     point, xy = np.empty(ends[-1], np.uint64), np.empty((ends[-1], 2))
     for row, (px, numbers) in enumerate(parts):
         point[ends[row] : ends[row + 1]] = numbers

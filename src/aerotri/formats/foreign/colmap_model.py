@@ -198,6 +198,12 @@ def no_measured_points(folder: Path) -> InputError:
     return InputError("the model has no points that were measured", "export it with its points", folder)
 
 
+def warn_of_no_points() -> None:
+    """Say that a model has photographs and cameras alone."""
+    about = "the model has no points that were measured: photographs, orientations and cameras are read"
+    warnings.warn(UserWarning(left_behind(f"{about}; add image points with --image-points")), stacklevel=4)
+
+
 def image_point_mm(px: np.ndarray, camera: Camera, folder: Path) -> np.ndarray:
     """(k, 2) mm of image points (k, 2) px.
 

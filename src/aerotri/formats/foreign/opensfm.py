@@ -26,7 +26,7 @@ from aerotri.formats.foreign.colmap_rigs import COLMAP_FROM_CAMERA
 from aerotri.formats.foreign.opensfm_cameras import camera_json, expressible, read_cameras
 from aerotri.formats.foreign.opensfm_json import Node, largest, points_of, read_reconstructions
 from aerotri.formats.foreign.opensfm_rigs import RigShots, rig_shots, rigs_of, split_cameras, stations_of
-from aerotri.formats.foreign.opensfm_tracks import HEADER, TRACKS, Tracks, read_tracks, track_line
+from aerotri.formats.foreign.opensfm_tracks import HEADER, TRACKS, Tracks, read_tracks, track_line, track_names
 from aerotri.formats.results.json_text import json_text
 from aerotri.formats.text.notes import assumed, left_behind, taken
 from aerotri.formats.text.sigmas import impossible_sigmas, why_impossible
@@ -99,7 +99,8 @@ def read_opensfm(path: FilePath, pixel_um: float = 1.0) -> Reading:
         raise chosen.error("has no shots")
     on_rigs = rig_shots(chosen)
     cameras, images, rigs = _images(chosen, shots, known, on_rigs)
-    names, xyz = points_of(chosen.get("points"))
+    names, xyz, said = _points(chosen, path.with_name(TRACKS))
+    messages += said
     tracks, said = _tracks(path.with_name(TRACKS), list(shots), names)
     messages += said
     present = np.zeros(len(names), bool)
@@ -185,6 +186,15 @@ def _images(
         texts(names), np.array(number, np.int64), np.full(len(names), ""), np.array(centre), angles, columns=columns
     )
     return (*cameras, *(by_name[key] for key in unused)), images, rigs_of(chosen, on_rigs, cameras_of_rigs)
+
+
+def _points(chosen: Node, tracks: Path) -> tuple[list[str], np.ndarray, list[str]]:
+    """Names and (N, 3) coordinates of the object points; without any, the tracks themselves are points to be placed."""
+    names, xyz = points_of(chosen.get("points")) if chosen.has("points") else ([], no_sigma(0))
+    if names or not tracks.is_file():
+        return names, xyz, []
+    names = track_names(tracks)
+    return names, no_sigma(len(names)), [taken(f"holds no object points: those of {TRACKS} are placed anew")]
 
 
 def _tracks(path: Path, images: list[str], points: list[str]) -> tuple[Tracks, list[str]]:

@@ -52,6 +52,19 @@ def read_tracks(path: Path, images: list[str], points: list[str]) -> Tracks:
     return _read_line_by_line(path, images, points) if found is None else found
 
 
+def track_names(path: Path) -> list[str]:
+    """The names of all tracks, in the order in which they appear.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read.
+    """
+    file = TextFile(path, comments=False)
+    cells = [line.split("\t", 2) for line in file.lines if not line.startswith(HEADER)]
+    return list(dict.fromkeys(row[1].strip() for row in cells if len(row) > 1 and row[1].strip()))
+
+
 def _read_quickly(path: Path, images: list[str], points: list[str]) -> Tracks | None:
     """As `read_tracks`, by pyarrow; None where anything is out of order."""
     import pyarrow as pa
