@@ -238,3 +238,40 @@ def test_folders_get_ordinary_permissions(tmp_path):
     with atomic_folder(tmp_path / "new"):
         time.sleep(0)
     assert (tmp_path / "new").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_files_of_another_command_stay_ours(tmp_path):
+    """Two formats in one folder: neither takes the files of the other for the user's, unless somebody changed them."""
+    out = tmp_path / "out"
+
+    def write(*names):
+        with atomic_folder(out, own=names) as place:
+            for name in names:
+                (place / name).write_text(f"ours {name}")
+
+    write("bundle.out")
+    write("tracks.csv")
+    assert foreign_files(out, ["bundle.out", "tracks.csv"]) == []
+    write("bundle.out")
+    assert _names(out) == ["bundle.out", "tracks.csv"]
+    (out / "bundle.out").write_text("mine")
+    write("tracks.csv")
+    assert foreign_files(out, ["bundle.out", "tracks.csv"]) == ["bundle.out"]
+    assert (out / "bundle.out").read_text() == "mine"
+    write("bundle.out")
+    assert (out / "bundle.yours1.out").read_text() == "mine"
+    (out / "bundle.yours1.out").unlink()
+    (out / "new.txt").write_text("mine")
+    write("new.txt")
+    assert _names(out) == ["bundle.out", "new.txt", "new.yours1.txt", "tracks.csv"]
+
+
+def test_the_same_content_is_no_copy(tmp_path):
+    """A folder that was copied without its list holds what is written again."""
+    out = tmp_path / "out"
+    with atomic_folder(out, own=("a.csv",)) as place:
+        (place / "a.csv").write_text("ours")
+    (out / ".aerotri-files").write_text("{}")
+    with atomic_folder(out, own=("a.csv",)) as place:
+        (place / "a.csv").write_text("ours")
+    assert _names(out) == ["a.csv"]

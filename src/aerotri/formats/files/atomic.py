@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from aerotri.conventions import FilePath, InputError
-from aerotri.formats.files.ownership import carry_over, record_files
+from aerotri.formats.files.ownership import carry_over, record_carried, record_files
 from aerotri.formats.files.places import full_disk, not_written, place_of
 from aerotri.formats.files.work_place import OLDER, work_place, written
 from aerotri.rasters.room import is_full
@@ -91,7 +91,7 @@ def atomic_folder(target: FilePath, own: Collection[str] | None = None, gone: Co
             _refuse_full(target)
             if target.is_dir():
                 seen: set[Path] = set()
-                carry_over(target, new, own or (), gone, seen)
+                record_carried(new, carry_over(target, new, own or (), gone, seen))
                 _exchange(new, target)
                 # what came while it was being carried over
                 carry_over(new, target, own or (), gone, seen)

@@ -51,7 +51,18 @@ def told_by(path: Path) -> list[Any]:
 
 def record_files(folder: Path) -> None:
     """List all files that a new folder holds."""
-    listed = {str(rel): fingerprint(folder / rel) for rel in _files(folder) if not (folder / rel).is_symlink()}
+    _write_list(
+        folder, {str(rel): fingerprint(folder / rel) for rel in _files(folder) if not (folder / rel).is_symlink()}
+    )
+
+
+def record_carried(folder: Path, carried: Mapping[str, str]) -> None:
+    """Add files of earlier runs to the list of a new folder that they were carried over to, as they were listed."""
+    if carried:
+        _write_list(folder, {**carried, **(recorded_files(folder) or {})})
+
+
+def _write_list(folder: Path, listed: Mapping[str, str]) -> None:
     (folder / LEDGER).write_text(json.dumps(listed, indent=0, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
@@ -93,15 +104,22 @@ def is_own(folder: Path, rel: Path, ledger: Mapping[str, str]) -> bool:
     return known is not None and path.is_file() and not path.is_symlink() and fingerprint(path) == known
 
 
-def carry_over(old: Path, new: Path, own: Collection[str], gone: Collection[str], seen: set[Path]) -> None:
-    """Bring what is not ours into the new folder, as links where the file system has them; `old` stays whole.
+def carry_over(old: Path, new: Path, own: Collection[str], gone: Collection[str], seen: set[Path]) -> dict[str, str]:
+    """Bring what this run does not replace into the new folder, as links where the file system has them.
+
+    `old` stays whole. What other runs of this program wrote there stays known as ours: as it is listed, so that a file
+    that was changed since stays the user's.
 
     Parameters
     ----------
     own : entries of the folder that its writer gives. gone : further files of ours, as relative paths.
     seen : files that a call before has looked at; those of this one are added.
+
+    Returns
+    -------
+    Fingerprints in the old list of the files that were brought, by relative path.
     """
-    ledger = recorded_files(old)
+    ledger, carried = recorded_files(old), {}
     for rel in _files(old, empty_folders=True):
         if rel in seen or str(rel) == LEDGER or str(rel) in gone:
             continue
@@ -110,11 +128,14 @@ def carry_over(old: Path, new: Path, own: Collection[str], gone: Collection[str]
         if _dropped(old, rel, own, ledger):
             continue
         if os.path.lexists(place):
-            if ledger is None or str(rel) in ledger or source.is_dir():
+            if ledger is None or source.is_dir() or is_own(old, rel, ledger) or _are_same(source, place):
                 continue
-            # a file of the user under a name that is now ours
+            # a file of the user under a name that is now ours, or one of ours that the user changed
             place = _free_name(place)
+        elif ledger is not None and str(rel) in ledger:
+            carried[str(rel)] = ledger[str(rel)]
         _bring(source, place)
+    return carried
 
 
 def keep_written(old: Path, new: Path, names: Collection[str]) -> None:
@@ -151,6 +172,12 @@ def _bring(source: Path, place: Path) -> None:
         os.link(source, place, follow_symlinks=False)
     except OSError:
         shutil.copy2(source, place, follow_symlinks=False)
+
+
+def _are_same(one: Path, other: Path) -> bool:
+    """Whether two files have the same content; links are no files."""
+    plain = all(path.is_file() and not path.is_symlink() for path in (one, other))
+    return plain and one.stat().st_size == other.stat().st_size and fingerprint(one) == fingerprint(other)
 
 
 def _free_name(place: Path) -> Path:
