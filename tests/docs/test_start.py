@@ -69,6 +69,18 @@ def test_other_programs(place):
         pytest.skip(f"followed but for the data sets that are not there: {', '.join(sorted(missing))}")
 
 
+@pytest.mark.slow
+def test_ppk_flight(place):
+    """Positions of the page hold the block alone; control points, none of which is used, are right to centimetres."""
+    run = list(pages.follow(START / "ppk.md", place))
+    assert [words[0] for words in run] == ["tiepoints", "adjust"]
+    result = read(place / "ppk_block_result" / "adjustment.json")
+    assert result["verdict"] == "accepted"
+    rms = result["check_points"]["rms"]
+    assert max(rms.values()) < 0.06
+    assert "12 fixed" in " ".join(read(place / "ppk_block" / "import.json")["taken"]["notes"])
+
+
 def test_page_of_the_drone_flight_has_the_commands_of_its_data():
     """These are run, as they stand there, by the test of the data set."""
     text = (PROJECT / "blocks" / "drone_site" / "README.md").read_text(encoding="utf-8")

@@ -235,3 +235,52 @@ def test_real_flight():
     assert len(whole.images) == 586
     assert np.isfinite(whole.xyz).all()
     assert whole.sigma.max() < 0.02
+
+
+def photographs_in(folder, names, time):
+    """Photographs of a folder, as far as their positions need them."""
+    from aerotri.tie_points.photographs import PhotographSet
+
+    n = len(names)
+    nothing = np.full((n, 3), np.nan)
+    return PhotographSet(
+        tuple(folder / name for name in names), np.array(names), (), np.zeros(n, int), nothing, nothing,
+        np.zeros(n, bool), time,
+    )  # fmt: skip
+
+
+def test_time_stamps_beside_the_photographs_of_two_flights(tmp_path):
+    """Each flight has its folder, numbers from 1 and a .MRK of its own; one trajectory covers both."""
+    from aerotri.tie_points.stated import GivenFiles, read_given, sources_of_photographs
+
+    first, second = TAKEN[:9], TAKEN[12:20]
+    for folder, taken in (("100_0001", first), ("100_0002", second)):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / f"{folder}_Timestamp.MRK").write_text(mrk(taken))
+    (tmp_path / "flight.pos").write_text(rtklib(EPOCHS))
+    names = [f"{folder}/DJI_{k:04d}.JPG" for folder, n in (("100_0001", 9), ("100_0002", 8)) for k in range(1, n + 1)]
+    photographs = photographs_in(tmp_path, names, exif(np.concatenate([first, second])))
+    files = GivenFiles(positions=str(tmp_path / "flight.pos"))
+    found = read_given(files, 0.5, photographs).positions
+    assert found is not None
+    assert found.images.tolist() == names
+    apart = (found.xyz - np.vstack([cameras(first), cameras(second)])) * metres_of_units(found.xyz)
+    np.testing.assert_allclose(apart, 0.0, atol=2e-3)
+    sources = sources_of_photographs(photographs, tmp_path, files, None)
+    assert [source.holds for source in sources] == ["photographs", "positions", "time stamps", "time stamps"]
+
+
+def test_one_error_of_the_clock_is_no_error_of_numbers(tmp_path):
+    """Numbers that fit by chance after one photograph was deleted do not shift the others: times say otherwise."""
+    from aerotri.tie_points.stated import GivenFiles, read_given
+
+    (tmp_path / "flight.MRK").write_text(mrk(TAKEN))
+    (tmp_path / "flight.pos").write_text(rtklib(EPOCHS))
+    names = [f"DJI_{k:04d}.JPG" for k in range(1, 22)]
+    photographs = photographs_in(tmp_path, names, exif(TAKEN[1:]))
+    found = read_given(GivenFiles(positions=str(tmp_path / "flight.pos")), 0.5, photographs).positions
+    assert found is not None
+    assert found.images.tolist() == names
+    # by the camera's clock, so that photographs without a position have the same
+    np.testing.assert_allclose(np.diff(found.time), np.diff(TAKEN[1:]), atol=1e-5)
+    assert np.abs(found.time - exif(TAKEN[1:]) % 86400.0).max() < 1.0

@@ -91,17 +91,18 @@ def _matched(
     """(p,) the time stamp of every photograph, −1 for none, and what to say of it."""
     index = _by_number(stamps, photographs.names)
     found = int((index >= 0).sum())
-    if found * 2 > len(index):
-        off = _disagreeing(stamp_time, photographs.time, index)
-        if len(off) <= FEW * found:
-            index[off] = -1
-            return index, _about_off(stamps, photographs.names[off])
+    off = _disagreeing(stamp_time, photographs.time, index)
+    are_numbers = found * 2 > len(index)
+    if are_numbers and not len(off):
+        return index, []
     by_time = _by_time(stamp_time, photographs.time)
-    if by_time is not None:
+    if by_time is not None and not (are_numbers and len(off) <= (by_time < 0).sum()):
         told = f"{stamps.files[0].name}: photographs were matched by their times, not by numbers in their names"
         return by_time, [assumed(told)]
-    if found * 2 > len(index):
-        off = _disagreeing(stamp_time, photographs.time, index)
+    if are_numbers and len(off) <= FEW * found:
+        index[off] = -1
+        return index, _about_off(stamps, photographs.names[off])
+    if are_numbers:
         raise InputError(
             f"the times of {len(off)} of {found} photographs do not agree with the time stamps of their numbers: "
             f"{_some(photographs.names[off])}",
