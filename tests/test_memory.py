@@ -40,11 +40,27 @@ def test_limits_of_container_and_process_count(monkeypatch, tmp_path):
 
 def test_refusal_says_what_would_fit(four_gib):
     refuse_beyond_memory(1 << 30, "things", "take fewer")
-    with pytest.raises(InputError, match=r"things need 8.0 GiB of memory, 4.0 GiB are free — take 0.4 of them"):
+    said = r"things need 8\.0 GiB of memory; 3\.2 GiB may be used, 80 % of what is free — take 0\.4 of them"
+    with pytest.raises(InputError, match=said):
         refuse_beyond_memory(8 << 30, "things", "take {share} of them")
     with pytest.raises(InputError, match="far more than a machine has"):
         refuse_beyond_memory(float("inf"), "things", "")
     assert fitting(1 << 20) == pytest.approx(0.8 * 4096)
+
+
+@pytest.mark.parametrize(
+    ("needed", "there", "words"),
+    [
+        (6.0 * 2**30, 5.6 * 2**30, ("6.0 GiB", "5.6 GiB")),
+        (6.01 * 2**30, 6.0 * 2**30, ("6.1 GiB", "6.0 GiB")),
+        (3.0 * 2**30 + 1, 3.0 * 2**30, ("3.1 GiB", "3.0 GiB")),
+        (30.2 * 2**20, 30.1 * 2**20, ("30.2 MiB", "30.1 MiB")),
+        (1e30, 2**31, ("far more than a machine has", "2.0 GiB")),
+    ],
+)
+def test_two_sizes_never_contradict_each_other(needed, there, words):
+    """6.01 are more than 6.00, and are not both written as 6.0."""
+    assert memory.two_sizes(needed, there) == words
 
 
 @pytest.mark.parametrize(

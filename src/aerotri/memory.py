@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from aerotri.conventions import InputError
 
+FAR_MORE = 1e15
+"""Bytes that no machine has."""
 SHARE = 0.8
 """Of the memory that is free: the rest is for what is not predicted, and for others."""
 NAMES_OF_LIMITS = (
@@ -37,8 +40,10 @@ def refuse_beyond_memory(needed: float, what: str, remedy: str) -> None:
     there = available_bytes()
     if there is not None and not needed <= SHARE * there:
         share = SHARE * there / needed if needed < float("inf") else 0.0
+        wanted, allowed = two_sizes(needed, SHARE * there)
         raise InputError(
-            f"{what} need {_sized(needed)} of memory, {_sized(there)} are free", remedy.format(share=f"{share:.2g}")
+            f"{what} need {wanted} of memory; {allowed} may be used, {100.0 * SHARE:.0f} % of what is free",
+            remedy.format(share=f"{share:.2g}"),
         )
 
 
@@ -48,8 +53,11 @@ def fitting(bytes_each: float) -> float:
     return float("inf") if there is None or not bytes_each > 0.0 else SHARE * there / bytes_each
 
 
-def _sized(count: float) -> str:
-    return f"{count / 2**30:.1f} GiB" if count < 1e15 else "far more than a machine has"
+def two_sizes(needed: float, there: float) -> tuple[str, str]:
+    """Bytes that are needed and fewer that there are, in words: rounded apart, so that they never seem to be enough."""
+    unit, name = (2**30, "GiB") if there >= 2**30 else (2**20, "MiB")
+    wanted = f"{math.ceil(10 * needed / unit) / 10:.1f} {name}" if needed < FAR_MORE else "far more than a machine has"
+    return wanted, f"{math.floor(10 * there / unit) / 10:.1f} {name}"
 
 
 def _of_machine() -> int | None:

@@ -18,7 +18,7 @@ from threadpoolctl import ThreadpoolController
 
 from aerotri.conventions import InputError
 from aerotri.execution.threads import thread_count
-from aerotri.memory import available_bytes
+from aerotri.memory import available_bytes, two_sizes
 
 __all__ = ["blas_threads", "chunk_bounds", "refuse_more_than_there_is", "run_chunks", "thread_count"]
 
@@ -85,7 +85,8 @@ def refuse_more_than_there_is(needed: int, what: str) -> None:
     """
     there = available_bytes()
     if there is not None and needed > there:
+        wanted, free = two_sizes(needed, there)
         raise InputError(
-            f"{what} need {needed / 2**30:.1f} GiB of memory, {there / 2**30:.1f} GiB are free",
+            f"{what} need {wanted} of memory, {free} are free",
             "use a larger machine, fewer additional parameters or conditions, or divide the block",
         )

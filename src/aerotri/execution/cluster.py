@@ -26,7 +26,7 @@ from aerotri.execution.beginning import method, prepare_copies
 from aerotri.execution.choice import fewer_than
 from aerotri.execution.elsewhere import WORKER_VARIABLES, outcome_in, parcels, perform
 from aerotri.execution.work import MOST_TRIES, Ledger, Outcome, R, Report, S, Say, T, Work
-from aerotri.memory import SHARE, available_bytes, refuse_beyond_memory
+from aerotri.memory import SHARE, available_bytes, refuse_beyond_memory, two_sizes
 
 MEMORY = "MEMORY"
 """Name of the resource, in bytes, that workers offer (`dask worker --resources MEMORY=8e9`) and tasks take."""
@@ -253,9 +253,9 @@ class Dask:
         offered = [worker["resources"][MEMORY] for worker in workers if MEMORY in worker.get("resources", {})]
         free = offered or [_memory_of_thread(worker) for worker in workers]
         if max(free) < work.bytes_each:
+            wanted, there = two_sizes(work.bytes_each, max(free))
             raise InputError(
-                f"a task takes {work.bytes_each / 2**30:.1f} GiB of memory, no worker has more than "
-                f"{max(free) / 2**30:.1f} GiB for one",
+                f"a task takes {wanted} of memory, no worker has more than {there} for one",
                 "start workers with fewer threads (--nthreads 1) and more memory (--memory-limit, --resources MEMORY=…)"
                 if self._address
                 else "give fewer workers",

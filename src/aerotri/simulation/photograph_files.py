@@ -15,6 +15,7 @@ from aerotri.conventions import InputError, real_path
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.files.places import existing_folder
 from aerotri.formats.results.json_text import write_json
+from aerotri.memory import two_sizes
 from aerotri.observations import Block
 from aerotri.rasters.images import create_image
 from aerotri.simulation.exif_tags import GnssFix, exif_of, xmp_of
@@ -151,7 +152,8 @@ def _refuse_without_room(scene: Scene, chosen: Sequence[int], folder: Path) -> N
     needed = sum(2.0 * float(np.prod(scene.camera(image).nominal.size_px, dtype=float)) for image in chosen)
     free = shutil.disk_usage(existing_folder(real_path(folder))).free
     if needed > free:
+        wanted, there = two_sizes(needed, free)
         raise InputError(
-            f"{len(chosen)} photographs need {needed / 2**30:.3g} GiB, {free / 2**30:.3g} GiB of the disk are free",
+            f"{len(chosen)} photographs need {wanted}, {there} of the disk are free",
             "choose another place, or some of them by --only",
         )
