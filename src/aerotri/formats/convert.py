@@ -35,6 +35,7 @@ from aerotri.formats.foreign.metashape_cameras import write_metashape_cameras
 from aerotri.formats.foreign.metashape_files import is_metashape_project
 from aerotri.formats.foreign.metashape_project import read_metashape_project
 from aerotri.formats.foreign.odm import write_odm_gcp
+from aerotri.formats.foreign.openmvg import is_alicevision, is_openmvg, read_alicevision, read_openmvg
 from aerotri.formats.foreign.opensfm import is_opensfm, read_opensfm, write_opensfm
 from aerotri.formats.foreign.opensfm_in_place import origin_of, update_opensfm
 from aerotri.formats.foreign.opf import read_opf
@@ -57,6 +58,8 @@ RECOGNISERS: Mapping[str, Callable[[Path], bool]] = {
     "bal": is_bal,
     "bundler": is_bundler,
     "opf": is_opf,
+    "openmvg": is_openmvg,
+    "alicevision": is_alicevision,
     "opensfm": is_opensfm,
     "metashape-project": is_metashape_project,
     "pix4d-params": is_pix4d_params,
@@ -75,6 +78,8 @@ READERS: Mapping[str, Callable[[Path], tuple[Block, np.ndarray | None]]] = {
     "bal": read_bal,
     "bundler": lambda path: _block_and_points(read_bundler(path)),
     "opf": lambda path: _block_and_points(read_opf(path)),
+    "openmvg": lambda path: _block_and_points(read_openmvg(path)),
+    "alicevision": lambda path: _block_and_points(read_alicevision(path)),
     "opensfm": lambda path: _block_and_points(read_opensfm(path)),
     "metashape-project": lambda path: _block_and_points(read_metashape_project(path)),
     "pix4d-params": lambda path: _block_and_points(read_pix4d_params(path)),

@@ -88,6 +88,9 @@ def whole_files() -> list[tuple[str, str, bytes]]:
     """Format, file name and content of blocks that are one file."""
     bentley = of_tests("blocks_exchange_sample").BlocksExchange
     found = [("blocks-exchange", "site.xml", bentley(kind).text().encode()) for kind in ("local", "enu")]
+    scenes = of_tests("test_openmvg")
+    found += [("openmvg", "sfm_data.json", json.dumps(scenes.openmvg()).encode())]
+    found += [("alicevision", "sfm.sfm", json.dumps(scenes.alicevision(old)).encode()) for old in (True, False)]
     return [*found, ("pix4d-params", "x.txt", of_tests("test_pix4d_params").params().encode())]
 
 

@@ -7,7 +7,7 @@ points, or a list of orientations (photographs alone). What else is given is add
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
@@ -40,6 +40,7 @@ from aerotri.formats.foreign.colmap import read_colmap
 from aerotri.formats.foreign.ign import files_of, is_ign, is_ign_camera, read_ign_app, read_ign_camera, read_ign_mes
 from aerotri.formats.foreign.list_header import has_attitudes
 from aerotri.formats.foreign.metashape_project import read_metashape_project
+from aerotri.formats.foreign.openmvg import read_alicevision, read_openmvg
 from aerotri.formats.foreign.opensfm import read_opensfm
 from aerotri.formats.foreign.opensfm_gcp import NAME as OPENSFM_GCP
 from aerotri.formats.foreign.opf import read_opf
@@ -52,7 +53,13 @@ FOLDERS = {"ign": "IGN", "patb": "PAT-B"}
 """Kinds of folders whose files are parts."""
 UNKNOWN_PIXEL_UM = 1.0
 """Size of a pixel where nothing tells it; a principal distance of 3000 pixels then reads 3 mm."""
-MAY_FREE = ("blocks-exchange", "bundler", "colmap", "metashape-project", "opensfm", "opf", "pix4d-params")
+IN_PIXELS: Mapping[str, Callable[[Path, float], Reading]] = {
+    "alicevision": read_alicevision,
+    "openmvg": read_openmvg,
+    "opensfm": read_opensfm,
+}
+"""Whole blocks in one file that know no size of a pixel."""
+MAY_FREE = ("blocks-exchange", "bundler", "colmap", "metashape-project", "opf", "pix4d-params", *IN_PIXELS)
 """Whole blocks whose interior elements --free-interior makes unknowns."""
 CONTROL_BESIDE = (OPENSFM_GCP, "gcp_list.txt")
 """Control points of OpenSfM beside its reconstruction."""
@@ -236,22 +243,16 @@ def _as_it_is(request: Request, sources: Sources) -> Reading | None:
         raise InputError("has cameras of its own", remedy, path)
     if size_px is not None and kind != "bundler":
         raise InputError("has cameras of its own", "leave --camera-size out", path)
-    if kind == "metashape-project":
-        return read_metashape_project(path, pixel_um)
-    if kind == "blocks-exchange":
-        return read_blocks_exchange(path, pixel_um, request.stated.geoid)
-    if kind == "opf":
-        return read_opf(path, pixel_um, request.stated.geoid)
-    if kind == "pix4d-params":
-        offset = None if request.offset is None else read_pix4d_offset(request.offset)
-        return read_pix4d_params(path, pixel_um, offset)
+    with_pixels = _with_pixels(kind, path, request)
+    if with_pixels is not None:
+        return with_pixels
     said = () if pixel_um is not None else (_about_pixel(UNKNOWN_PIXEL_UM),)
-    if kind in ("bundler", "opensfm", "colmap"):
+    if kind in ("bundler", "colmap", *IN_PIXELS):
         pixel_um = UNKNOWN_PIXEL_UM if pixel_um is None else pixel_um
         if kind == "colmap":
             (block, points), heard = _with_warnings(lambda pixel=pixel_um: sources.colmap(path, pixel))
             return Reading(block, points, (*heard, *said))
-        read = read_bundler(path, pixel_um, size_px) if kind == "bundler" else read_opensfm(path, pixel_um)
+        read = read_bundler(path, pixel_um, size_px) if kind == "bundler" else IN_PIXELS[kind](path, pixel_um)
         return replace(read, messages=(*read.messages, *_control_beside(path, kind, request.control), *said))
     if pixel_um is not None:
         raise InputError("has cameras of its own", "leave --pixel-um out", path)
@@ -259,6 +260,21 @@ def _as_it_is(request: Request, sources: Sources) -> Reading | None:
         return Reading(read_block(path, rays_needed=False))
     block, points = convert.read_any(path, kind)
     return Reading(block, points)
+
+
+def _with_pixels(kind: str | None, path: Path, request: Request) -> Reading | None:
+    """A whole block of a format that tells the size of its pixels, or may; None of others."""
+    pixel_um, geoid = request.camera.pixel_um, request.stated.geoid
+    if kind == "metashape-project":
+        return read_metashape_project(path, pixel_um)
+    if kind == "blocks-exchange":
+        return read_blocks_exchange(path, pixel_um, geoid)
+    if kind == "opf":
+        return read_opf(path, pixel_um, geoid)
+    if kind == "pix4d-params":
+        offset = None if request.offset is None else read_pix4d_offset(request.offset)
+        return read_pix4d_params(path, pixel_um, offset)
+    return None
 
 
 def _with_warnings(read: Callable[[], _Read]) -> tuple[_Read, tuple[str, ...]]:
