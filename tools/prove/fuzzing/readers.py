@@ -10,6 +10,8 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from fuzzing import seeds
 from fuzzing.worker import Target
 
@@ -37,10 +39,14 @@ def _lists(written: dict[str, dict[str, bytes]]) -> list[Target]:
 
     options = kinds.ReadingOptions()
     lists, extra = seeds.of_tests("test_point_lists"), seeds.of_tests("test_orientation_lists")
+    flight, exposures = seeds.of_tests("gnss_files"), np.array([0.0, 2.1, 4.5, 6.2, 9.0, 10.7])
     samples: dict[str, list[bytes | None]] = {
         "patb-im": [written["patb"]["x/block.im"]],
         "bingo": [written["bingo"]["x"]],
         "ign-mes": [written["ign-mes"]["x"], seeds.real("ultracam_eagle_m3", "liaisons_test.mes")],
+        "dji-mrk": [flight.mrk(exposures).encode()],
+        "rtklib": [flight.rtklib(exposures).encode()],
+        "grafnav": [flight.grafnav(exposures).encode()],
         "metashape-markers": [seeds.metashape_project(".xml")["site.xml"]],
         "opensfm-gcp": [json.dumps(seeds.of_tests("test_opensfm_gcp").GCP).encode()],
         "odm-gcp": [lists.ODM_GCP.encode(), written["odm-gcp"]["x"]],
