@@ -116,6 +116,15 @@ LARGEST = 1e12
 """No number that a user states is larger, whatever its unit; a larger one would overflow in a square."""
 
 
+MOST_DIGITS = 9
+"""Of a whole number that somebody states [C]; Python refuses to read one of thousands of digits."""
+
+
+def whole_number(text: str, digits: int = MOST_DIGITS) -> int | None:
+    """The whole number, not negative, that a text states in ASCII digits; None where it is none."""
+    return int(text) if text.isascii() and text.isdecimal() and len(text) <= digits else None
+
+
 def in_digits(value: float, digits: int) -> str:
     """A number to so many digits, never as a power of ten: 302 → '300', 0.0123 → '0.012', both to two."""
     import numpy as np

@@ -96,3 +96,10 @@ def test_hostile_names_stay_text(client):
     """Names come as JSON, never in a page; no page holds a place for a name."""
     assert client.get("data/plan").headers["content-type"] == "application/json"
     assert "{{" not in client.get("").text
+
+
+def test_numbers_of_many_digits_are_the_askers_mistake(client):
+    """Rows that no array has, and numbers that Python does not read."""
+    for digits in (10, 19, 400, 4400):
+        for path in ("data/point/{}", "data/epipolar/0/{}", "tile/{}/0/0/0", "cutout/0?left={}&top=0&size=9"):
+            assert 400 <= client.get(path.format("9" * digits)).status_code < 500

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Literal
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, whole_number
 from aerotri.memory import fitting
 
 THREADS = "threads"
@@ -63,12 +63,13 @@ def fewer_than(count: int, bytes_each: float, what: str) -> str:
 
 
 def _count(text: str, number: str, example: str) -> int:
-    if not (number.isascii() and number.isdigit() and int(number) >= 1):
+    count = whole_number(number)
+    if not count:
         raise InputError(
-            f"executor '{text}': '{number}' is not a number of processes",
+            f"executor '{text[:60]}': '{number[:60]}' is not a number of processes",
             f"give a whole number of 1 or more, such as {example}",
         )
-    return int(number)
+    return count
 
 
 def _refuse_without_dask() -> None:

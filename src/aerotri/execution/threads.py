@@ -5,14 +5,15 @@ from __future__ import annotations
 import os
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 
+from aerotri.conventions import whole_number
 from aerotri.execution.work import Ledger, Outcome, R, Report, S, T, Work, outcome_of
 
 
 def thread_count() -> int:
     """Threads to work in: AEROTRI_THREADS, or the processors this process may use."""
-    asked = os.environ.get("AEROTRI_THREADS", "")
-    if asked.isdigit() and int(asked) > 0:
-        return int(asked)
+    asked = whole_number(os.environ.get("AEROTRI_THREADS", ""))
+    if asked:
+        return asked
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

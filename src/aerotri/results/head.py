@@ -7,18 +7,21 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
+from aerotri.conventions import whole_number
 from aerotri.coordinates.crs_names import crs_names
 from aerotri.observations.project import Project
 from aerotri.version import __version__
 
+LONGEST_TIME = 11
+"""Digits of seconds since 1970, up to the year 5138; with one more, dates have no name."""
 CLOCK = "SOURCE_DATE_EPOCH"
 """Seconds since 1970 that stand for now: the variable by which builds are repeated bit for bit."""
 
 
 def now() -> datetime:
     """The time, to the second; that of `SOURCE_DATE_EPOCH` where it is set."""
-    stated = os.environ.get(CLOCK, "")
-    return datetime.fromtimestamp(int(stated), UTC) if stated.isdigit() else datetime.now(UTC).replace(microsecond=0)
+    stated = whole_number(os.environ.get(CLOCK, ""), digits=LONGEST_TIME)
+    return datetime.now(UTC).replace(microsecond=0) if stated is None else datetime.fromtimestamp(stated, UTC)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, counted, px_from_mm
+from aerotri.conventions import FilePath, InputError, counted, px_from_mm, whole_number
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import no_sigma
 from aerotri.formats.files.atomic import atomic_folder
@@ -264,7 +264,7 @@ def _model(
 
 def point_numbers(names: np.ndarray) -> np.ndarray:
     """(N,) uint64 numbers of points: their names where all are numbers, 1, 2, 3 … otherwise."""
-    plain = [name.isascii() and name.isdigit() and str(int(name)) == name and len(name) < 19 for name in names.tolist()]
+    plain = [(number := whole_number(name, digits=18)) is not None and str(number) == name for name in names.tolist()]
     if all(plain):
         return names.astype(np.uint64)
     return np.arange(1, len(names) + 1, dtype=np.uint64)

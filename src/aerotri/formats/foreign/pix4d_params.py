@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, counted
+from aerotri.conventions import FilePath, InputError, counted, whole_number
 from aerotri.formats.assembly.parts import Reading
 from aerotri.formats.foreign.colmap_rigs import COLMAP_FROM_CAMERA
 from aerotri.formats.foreign.pix4d import read_pix4d_offset
@@ -95,7 +95,7 @@ def _first_row(file: TextFile) -> int:
         raise file.error(0, f"does not begin with {HEADER}", "give …_calibrated_camera_parameters.txt of Pix4D")
     for row, line in enumerate(file.lines):
         words = line.split()
-        if len(words) >= 3 and all(word.isdigit() for word in words[-2:]):
+        if len(words) >= 3 and all(whole_number(word) is not None for word in words[-2:]):
             return row
     raise file.error(0, "holds no photographs", REMEDY)
 
@@ -106,7 +106,7 @@ def _photographs(file: TextFile, begin: int) -> tuple[list[str], list[tuple[int,
     names, sizes, values = [], [], []
     for row in range(begin, len(file), step):
         words = file.lines[row].split()
-        if len(words) < 3 or not all(word.isdigit() and int(word) > 0 for word in words[-2:]):
+        if len(words) < 3 or not all(whole_number(word) for word in words[-2:]):
             raise file.error(row, "is no row of name, width and height", REMEDY)
         if row + step > len(file):
             raise file.error(row, f"photograph '{words[0][:60]}' is cut off", REMEDY)
