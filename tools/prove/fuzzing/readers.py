@@ -52,6 +52,7 @@ def _lists(written: dict[str, dict[str, bytes]]) -> list[Target]:
         "odm-gcp": [lists.ODM_GCP.encode(), written["odm-gcp"]["x"]],
         "pix4d-eo": [extra.EO.encode(), written["pix4d-eo"]["x"]],
         "metashape": [written["metashape"]["x"]],
+        "realitycapture": [seeds.of_tests("test_realitycapture").LIST.encode()],
         "ign-opk": [written["ign"]["x"]],
         "patb-ori": [written["patb"]["x/block.ori"]],
         "opk-list": [extra.PLAIN.encode(), seeds.real("dmc_ngi", "camera_pos_ori.txt")],

@@ -44,6 +44,7 @@ from aerotri.formats.foreign.pix4d import (
     read_pix4d_gcp,
     read_pix4d_geo,
 )
+from aerotri.formats.foreign.realitycapture import is_realitycapture, read_realitycapture
 from aerotri.formats.foreign.rtklib import is_rtklib, read_rtklib
 
 
@@ -95,6 +96,7 @@ RAYS: Kinds = {
 ORIENTATIONS: Kinds = {
     "pix4d-eo": (is_pix4d_eo, lambda path, options: read_pix4d_eo(path, options.offset)),
     "metashape": (is_metashape, lambda path, _: read_metashape(path)),
+    "realitycapture": (is_realitycapture, lambda path, _: read_realitycapture(path)),
     "ign-opk": (is_ign_opk, lambda path, _: read_ign_opk(path)),
     "patb-ori": (is_patb_ori, lambda path, options: read_patb_ori(path, options.patb_rotation)),
     "opk-list": (is_orientation_list, lambda path, _: read_orientation_list(path)),
