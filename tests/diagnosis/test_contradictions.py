@@ -10,7 +10,7 @@ from aerotri.diagnosis import findings
 from aerotri.diagnosis.common_motion import of_common_motion
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.pipeline import adjust_keeping_system
-from aerotri.results.common_motion import CHANCE, SUSPECTED
+from aerotri.results.common_motion import CHANCE, SUSPECTED, CommonMotion
 from aerotri.results.control_heights import BOWL, NAMES, SPLIT
 from aerotri.statistics.control_heights import control_heights
 from dense_algebra import TINY
@@ -114,9 +114,34 @@ def test_what_control_and_gnss_cannot_show():
     note = next(f for f in findings(found) if f.quantity == "what this block cannot show")
     assert "map grid" in note.says
     assert "shadows" in note.says
-    assert f"a tilt of all control points against GNSS below {motion.detectable_tilt_m:.2g} m" in note.says
-    assert 3.0 < motion.detectable_tilt_m / motion.tilt_m[1] < 5.0
-    assert motion.detectable_tilt_m < 2.0
+    along_x, along_y = motion.detectable_tilt_m
+    assert f"against GNSS below {along_x:.2g} m along X, or {along_y:.2g} m along Y" in note.says
+    assert 3.0 < along_x / (motion.turn_sigma[1] * motion.extent[0]) < 5.0
+    assert motion.detectable_tilt_m.max() < 2.0
+
+
+def test_a_tilt_has_the_sigma_of_its_direction():
+    """Of a long block: the tilt about its length is hardly known, that along it is."""
+    sigma, extent = np.array([1e-3, 1e-5, 1e-5]), np.array([3000.0, 300.0, 0.0])
+
+    def motion(about_x, about_y, correlation=0.0):
+        turn = np.array([about_x, about_y, 0.0])
+        return CommonMotion(turn, sigma, 0.0, 1e-5, 1e-9, 0.5, 0.5, extent, tilt_correlation=correlation)
+
+    assert motion(0.0, 1e-4).tilt_m == pytest.approx((0.3, 0.03))
+    assert motion(1e-3, 0.0).tilt_m == pytest.approx((0.3, 0.3))
+    assert motion(0.0, 0.0).detectable_tilt_m[1] == pytest.approx(10.0 * motion(0.0, 0.0).detectable_tilt_m[0])
+    # about equal turns: by a sample of turns with this correlation
+    turn = np.array([2e-2, 2e-3])
+    covariance = np.array([[1e-6, 0.6e-8], [0.6e-8, 1e-10]])
+    sample = np.random.default_rng(1).multivariate_normal(turn, covariance, 100_000)
+    spread = np.std(np.hypot(*(sample * [300.0, 3000.0]).T))
+    assert motion(*turn, correlation=0.6).tilt_m[1] == pytest.approx(spread, rel=0.02)
+
+
+def test_of_faultless_blocks_one_in_a_hundred_is_suspected():
+    """Three tests together."""
+    assert pytest.approx(0.01) == 3.0 * SUSPECTED
 
 
 def test_a_tilt_that_may_be_chance_is_told_without_a_doubt():

@@ -121,6 +121,17 @@ def test_what_may_be_chance_is_told_without_a_doubt():
     assert [(one.level, one.grade) for one in said] == [("attention", "accepted")]
 
 
+def test_another_direction_of_the_rows_is_told():
+    local = adjust_keeping_system(drone(2)).local
+    found = replace(local.unmodelled_shutter, p=1e-9, moves_sigma=2.0)
+    for direction, words in (
+        ("right", 'rolling_shutter] with row_direction = "right" in'),
+        ("down", "shutter] in block"),
+    ):
+        one = replace(local, unmodelled_shutter=replace(found, row_direction=direction))
+        assert words in of_unmodelled_shutter(one)[0].reason
+
+
 def test_film_has_none():
     block = drone(2)
     marks = {"1": (-6.0, 0.0), "2": (6.0, 0.0)}

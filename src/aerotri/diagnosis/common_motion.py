@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.diagnosis.finding import Finding, doubt
+from aerotri.diagnosis.finding import NO_DOUBT, Finding, doubt
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.common_motion import CHANCE, SUSPECTED, CommonMotion
 
@@ -14,7 +14,6 @@ CAUSES_OF_SCALE = (
     "distances of the map grid taken for distances on the ground, or the other way round; another ellipsoid or unit; "
     "a principal distance that is held at a wrong value"
 )
-NO_DOUBT = "One faultless block in a hundred shows as much, so it does not count in the verdict: compare check points"
 
 
 def of_common_motion(adjusted: AdjustedBlock) -> list[Finding]:

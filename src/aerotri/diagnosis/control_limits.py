@@ -80,10 +80,11 @@ def _below_detection(adjusted: AdjustedBlock) -> list[str]:
         return []
     plan, height = of_known.median(np.hypot(sigma[:, 0], sigma[:, 1])), of_known.median(sigma[:, 2])
     length, found = float(np.hypot(*motion.extent[:2])), []
-    if motion.detectable_tilt_m > WORTH_SAYING * height:
+    along_x, along_y = motion.detectable_tilt_m
+    if max(along_x, along_y) > WORTH_SAYING * height:
         found.append(
-            f"a tilt of all control points against GNSS below {motion.detectable_tilt_m:.2g} m over the length of the "
-            "block"
+            f"a tilt of all control points against GNSS below {along_x:.2g} m along X, or {along_y:.2g} m along Y, "
+            "over the length of the block"
         )
     if motion.detectable_scale * length > WORTH_SAYING * plan:
         found.append(

@@ -18,6 +18,9 @@ GRADES: tuple[Grade, ...] = ("accepted", "doubtful", "rejected")
 SIGNIFICANCE = 0.001
 """Probability with which a rule may doubt a faultless block by chance."""
 
+NO_DOUBT = "One faultless block in a hundred shows as much, so it does not count in the verdict: compare check points"
+"""Of a finding that chance explains with a probability below 1 %, all its tests together."""
+
 SIGMA_GROUPS = 5
 """Groups of image points of one a-priori σ that are listed; of more the range is given."""
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from aerotri.diagnosis.common_motion import NO_DOUBT
-from aerotri.diagnosis.finding import Finding, doubt
+from aerotri.diagnosis.finding import NO_DOUBT, Finding, doubt
+from aerotri.observations.rolling_shutter import RollingShutter
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.unmodelled_shutter import UnmodelledShutter
+
+USUAL = RollingShutter()
 
 
 def of_unmodelled_shutter(adjusted: AdjustedBlock) -> list[Finding]:
@@ -33,10 +35,11 @@ def _reason(found: UnmodelledShutter) -> str:
         else ", or by an affinity of the camera: this block does not tell them apart. With a global shutter adjust b1 "
         "and b2 of brown"
     )
+    rows = "" if found.row_direction == USUAL.row_direction else f' with row_direction = "{found.row_direction}"'
     return (
         f"the rows of camera '{found.camera}' are displaced along the flight as by a rolling shutter: the camera seems "
         f"to move by {abs(found.way_m):.3f} m ({found.way_px:.1f} px) while a photograph is read; by chance with a "
         f"probability of {chance}. Modelled, the object points would move by {found.moves_m:.3f} m (RMS), "
-        f"{found.moves_sigma:.1f} times their σ. State [camera.{found.camera}.rolling_shutter] in block.toml"
+        f"{found.moves_sigma:.1f} times their σ. State [camera.{found.camera}.rolling_shutter]{rows} in block.toml"
         f"{other}"
     )

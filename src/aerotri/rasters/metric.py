@@ -95,9 +95,10 @@ class MetricReader(RasterReader):
         self._source: Any = None
         self._factor, self._heights = METRE, ""
         try:
+            units = units_of(self)
             if band == 1:
-                refuse_undeclared_no_data(self)
-            self._bring_to_metres(target)
+                refuse_undeclared_no_data(self, units.height or METRE)
+            self._bring_to_metres(units, target)
         except InputError:
             self._file.close()
             raise
@@ -121,8 +122,7 @@ class MetricReader(RasterReader):
         # heights that were in feet of a system without a code are in metres of one that has no name
         return with_heights(stated, metric) if metric.isdigit() or self._factor == METRE else plan_of(stated)
 
-    def _bring_to_metres(self, target: str | None) -> None:
-        units = units_of(self)
+    def _bring_to_metres(self, units: RasterUnits, target: str | None) -> None:
         if units.is_metric:
             return
         if units.height is None:

@@ -23,8 +23,12 @@ CLIFF_M, STEEP = 3.0, 10.0
 a wall, has lower ones somewhere."""
 
 
-def refuse_undeclared_no_data(reader: RasterReader) -> None:
+def refuse_undeclared_no_data(reader: RasterReader, metre: float) -> None:
     """Refuse a file without a value for no data in which one value looks like it.
+
+    Parameters
+    ----------
+    metre : metres in the unit that the reader's values count in.
 
     Raises
     ------
@@ -41,11 +45,15 @@ def refuse_undeclared_no_data(reader: RasterReader) -> None:
             continue
         there = sample == value
         rest = known[known != value]
-        if there.sum() < FEWEST or len(rest) < FEWEST or not _stands_apart(reader, value, there, rows, columns):
+        if (
+            there.sum() < FEWEST
+            or len(rest) < FEWEST
+            or not _stands_apart(reader, value, there, (rows, columns), metre)
+        ):
             continue
-        low, high = float(rest.min()), float(rest.max())
+        low, high, unit = float(rest.min()), float(rest.max()), "m" if metre == 1.0 else f"units of {metre:.7g} m"
         raise InputError(
-            f"has cells of exactly {value:.10g} m among heights of {low:.4g} to {high:.4g} m, and cliffs around them "
+            f"has cells of exactly {value:.10g} {unit} among heights of {low:.4g} to {high:.4g} {unit}, and cliffs around them "
             "everywhere: they look like cells without data, which the file does not declare",
             f"declare them: gdal_edit.py -a_nodata {value:.10g} {reader.path.name}; if they are heights, declare a "
             "value that does not occur, such as -a_nodata -9999",
@@ -58,13 +66,20 @@ def _is_usual(value: float) -> bool:
     return value in USUAL or abs(value) > 1e5 or set(f"{abs(value):.10g}") == {"9"}
 
 
-def _stands_apart(reader: RasterReader, value: float, there: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> bool:
-    """Whether all cells of a value lie behind cliffs, as far as pieces around some of them show."""
+def _stands_apart(
+    reader: RasterReader, value: float, there: np.ndarray, at: tuple[np.ndarray, np.ndarray], metre: float
+) -> bool:
+    """Whether all cells of a value lie behind cliffs, as far as pieces around some of them show.
+
+    Parameters
+    ----------
+    there : of a sample, cells with this value. at : rows and columns of the sample in the raster.
+    """
     places = np.argwhere(there)
     chosen = places[np.unique(np.linspace(0, len(places) - 1, WINDOWS).astype(int))]
     at_edge, elsewhere = [], []
     for i, j in chosen.tolist():
-        top, left = int(rows[i]) - WINDOW // 2, int(columns[j]) - WINDOW // 2
+        top, left = int(at[0][i]) - WINDOW // 2, int(at[1][j]) - WINDOW // 2
         piece = reader.read(top, left, WINDOW, WINDOW).astype(float)
         for one, other in ((piece[:, 1:], piece[:, :-1]), (piece[1:], piece[:-1])):
             step = np.abs(one - other)
@@ -74,4 +89,4 @@ def _stands_apart(reader: RasterReader, value: float, there: np.ndarray, rows: n
     edges, steps = np.concatenate(at_edge), np.concatenate(elsewhere)
     if not len(edges) or not len(steps):
         return False
-    return float(edges.min()) > max(CLIFF_M, STEEP * float(np.quantile(steps, 0.95)))
+    return float(edges.min()) > max(CLIFF_M / metre, STEEP * float(np.quantile(steps, 0.95)))

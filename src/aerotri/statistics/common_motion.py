@@ -95,6 +95,7 @@ def _of(
     return CommonMotion(
         turn[:3], sigma[:3], float(turn[3]), float(sigma[3]), _chance(turn, covariance, [0, 1]),
         _chance(turn, covariance, [2]), _chance(turn, covariance, [3]), extent, with_attitudes=len(moved) > 1,
+        tilt_correlation=float(covariance[0, 1] / (sigma[0] * sigma[1])),
     )  # fmt: skip
 
 
