@@ -1,11 +1,14 @@
 """Points that run through infinity in an adjustment by least squares: brought back, or left out with a word."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 
 import wrong_blocks
+from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.ray_status import RayStatus
+from aerotri.adjustment.runaway_points import _left_out
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.pipeline.chain import adjust
 from aerotri.simulation import parse_spec, simulate
@@ -26,6 +29,18 @@ def test_a_faultless_block_is_accepted_although_a_point_started_deep_below_the_g
     assert (result.rays.status == RayStatus.USED).all()
     off = (result.points.xyz - truth.points) / result.points.sigma
     assert np.abs(off).max() < 5.0
+
+
+def test_the_words_about_what_was_set_aside_besides_stay():
+    block, _ = simulate(parse_spec(SPEC), 139)
+    used = np.full(len(block.image_points), RayStatus.USED)
+    weak = np.where(block.image_points.image == 0, RayStatus.WEAK_PHOTOGRAPH, used)
+    system = SimpleNamespace(unknowns=SimpleNamespace(block=block))
+    before, rest = (Prepared(system, None, status, ("first",)) for status in (used, weak))
+    left = _left_out(rest, before, np.array([3]))
+    assert left.warnings[0] == "first"
+    assert left.warnings[1].startswith(f"1 photograph ({block.images.names[0]})")
+    assert left.warnings[2] == f"1 point ({block.points[3]}) whose rays do not intersect, left out"
 
 
 NEAR = {"kind": "perturbed", "position_sigma_m": 0.01, "angle_sigma_deg": 0.001}

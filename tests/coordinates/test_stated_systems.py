@@ -50,6 +50,12 @@ def test_units_become_factors_and_are_told(text, crs, plan, height):
     assert "brought to metres" in found.note
 
 
+@pytest.mark.parametrize("unit", ["0", "-1", ".", "1e999", "nan", ""])
+def test_units_of_local_coordinates_that_are_none(unit):
+    with pytest.raises(InputError, match=f"states a unit of '{unit}' m"):
+        stated_system(f'LOCAL_CS["Local",LOCAL_DATUM["Local",0],UNIT["metre",{unit}]]')
+
+
 @pytest.mark.parametrize("text", ["", "gcp", "hello", "EPSG:999999", "WGS84 UTM 61N", "a.jpg 1 2 3", "x" * 30_000])
 def test_what_is_no_system(text):
     assert stated_system(text) is None

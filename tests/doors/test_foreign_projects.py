@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 
 import numpy as np
 import pytest
 
 from aerotri.conventions import InputError
+from aerotri.foreign_json import read_foreign_json
 from aerotri.formats.block.folder import read_block
 from places import SHARED_DATA
 
@@ -62,3 +65,23 @@ def test_half_a_character_of_a_name(door, run):
     door("opensfm_surrogate")
     with pytest.raises(InputError, match=r"reconstruction\.json:1: a text has half a character, \\ud83d"):
         run("convert . --out B")
+
+
+@pytest.mark.parametrize(
+    ("text", "half"),
+    [
+        (r"\ud83d", r"\ud83d"), (r"\\ud83d\ude00", r"\ude00"), (r"\ud83d\\ude00", r"\ud83d"),
+        (r"\ude00\ud83d", r"\ude00"), (r"a\"\uDC00", r"\udc00"), (r"\ud83d\ude00", ""), (r"\\ud83d", ""),
+        (r"\\\ud83d\ude00", ""),
+    ],
+)  # fmt: skip
+def test_halves_of_characters(tmp_path, text, half):
+    """Behind an escaped backslash there is no escape."""
+    path = tmp_path / "names.json"
+    path.write_text('{"other": "x",\n "name": "' + text + '", "' + text + '": 1}')
+    if not half:
+        json.dumps(read_foreign_json(path, ""), ensure_ascii=False).encode("utf-8")
+        return
+    with pytest.raises(InputError, match=re.escape(f"half a character, {half}")) as caught:
+        read_foreign_json(path, "")
+    assert caught.value.line == 2

@@ -139,6 +139,38 @@ def test_it_is_told(both):
     assert not other_set_in_words(little)
     assert of_other_set(replace(both[0].adjusted, model_part=little))[0].level == "good"
     assert not of_other_set(both[1].adjusted)
+
+
+@pytest.mark.parametrize(
+    ("changes", "value", "says"),
+    [
+        (
+            {"height_sigma": 5.0, "plan_sigma": 0.2, "unexplained": 0.0},
+            "heights 0.5 m, 5.0 times σ",
+            "σ of both explain",
+        ),
+        (
+            {"height_sigma": 0.2, "plan_sigma": 5.0, "unexplained": 0.0},
+            "positions 0.3 m, 5.0 times σ",
+            "σ of both explain",
+        ),
+        (
+            {"height_sigma": 0.2, "plan_sigma": 1.5, "weight": 0.01},
+            "positions 0.3 m, 1.5 times σ",
+            "adds little to the total σ",
+        ),
+        ({"height_sigma": 0.2, "plan_sigma": 0.1}, "heights 0.5 m, 0.2 times σ", "changes little"),
+    ],
+)
+def test_a_difference_that_adds_nothing_is_told_as_it_is(both, changes, value, says):
+    other = OtherSet("x", 0.5, plan_m=0.3, height_m=0.5, unexplained=1.0)
+    adjusted = replace(both[0].adjusted, model_part=ModelPart(other_set=replace(other, **changes)))
+    (found,) = of_other_set(adjusted)
+    assert (found.level, found.value) == ("good", value)
+    assert says in found.says
+
+
+def test_no_difference_is_null_in_json():
     assert ModelPart(other_set=OtherSet("none", 0.5)).as_dict()["other_set"]["height_m"] is None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import rasterio
 
 from aerotri.conventions import InputError
 from aerotri.rasters.grids import Grid, RasterWriter
@@ -47,6 +48,22 @@ def test_holes_are_noticed(tmp_path, value):
 def test_ground_is_not(tmp_path, heights):
     with MetricReader(written(tmp_path / "dem.tif", heights)) as reader:
         assert reader.note == ""
+
+
+@pytest.mark.parametrize(("step", "refused"), [(6.0, False), (20.0, True)])
+def test_cliffs_are_measured_in_metres(tmp_path, step, refused):
+    """A basin of 6 feet is not deep."""
+    path = tmp_path / "feet.tif"
+    with RasterWriter(path, GRID, np.float32, crs="EPSG:2263", no_data=None) as writer:
+        writer.write(0, 0, np.where(HOLES, 0.0, step + 0.1 * (GROUND - HILLS)).astype(np.float32))
+    with rasterio.open(path, "r+") as file:
+        file.units = ["US survey foot"]
+    if refused:
+        with pytest.raises(InputError, match=r"exactly 0 units of 0\.3048006 m among heights of 19\.\d* to 20"):
+            MetricReader(path)
+        return
+    with MetricReader(path) as reader:
+        assert "brought" in reader.note
 
 
 def test_what_is_declared_is_not_asked_about(tmp_path):

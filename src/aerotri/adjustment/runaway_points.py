@@ -21,7 +21,7 @@ from aerotri.adjustment.carry_over import reference_state, start_values_at, with
 from aerotri.adjustment.directions import directions_of
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.prepare import Prepared
-from aerotri.adjustment.ray_status import RayStatus, some_names
+from aerotri.adjustment.ray_status import RayStatus, some_names, with_weak_words
 from aerotri.adjustment.robust import normalised_lengths, scale_of
 from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.start_values import intersect_into
@@ -108,7 +108,7 @@ def _brought_back(
     system, begin = build_system(u.block, start, status)
     reference = reference_state(system.unknowns, prepared.system.unknowns, begin, prepared.state)
     state = with_shared(system.unknowns, u, begin, without.state)
-    return Prepared(system, reference, status, prepared.warnings), state
+    return Prepared(system, reference, status, with_weak_words(u.block, status, prepared.warnings)), state
 
 
 def _left_out(found: Prepared, before: Prepared, points: np.ndarray) -> Prepared:
@@ -119,4 +119,4 @@ def _left_out(found: Prepared, before: Prepared, points: np.ndarray) -> Prepared
     status = found.ray_status.copy()
     status[np.isin(block.image_points.point, points) & (before.ray_status == RayStatus.USED)] = RayStatus.NO_START
     words = f"{some_names(block.points[points], 'point')} whose rays do not intersect, left out"
-    return replace(found, ray_status=status, warnings=(*before.warnings, words))
+    return replace(found, ray_status=status, warnings=(*with_weak_words(block, status, before.warnings), words))

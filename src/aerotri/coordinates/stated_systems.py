@@ -23,7 +23,7 @@ LOCAL_NAMES = re.compile(
     re.IGNORECASE,
 )
 LOCAL_WKT = re.compile(r"(?:local_cs|engcrs|engineeringcrs)\[", re.IGNORECASE)
-UNIT_WKT = re.compile(r'UNIT\["[^"]*",\s*([0-9.eE+-]+)')
+UNIT_WKT = re.compile(r'UNIT\["[^"]*",\s*([^,\]]*)')
 NOT_USED = re.compile(r"\+(?:geoidgrids|nadgrids|geoid_crs|pm=(?!0|greenwich)|axis=(?!enu)|proj=pipeline)[^ ]*")
 UTM = re.compile(
     r"(?:(?P<datum>WGS\s?84|ETRS\s?89|NAD\s?83|ED\s?50)\s*/?\s*)?UTM\s*(?:zone)?\s*(?P<zone>\d{1,2})\s*(?P<half>[NS])",
@@ -33,6 +33,8 @@ CODES = re.compile(r"EPSG:\s*(\d{1,6})(?:\s*\+\s*(?:EPSG:)?\s*(\d{1,6}))?", re.I
 AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d{1,6})"?\]\s*\]\s*$')
 UNIT_IN_NAME = re.compile(r"\s*\((?:ftUS|ft|US survey foot|foot)\)$")
 REMEDY = "write it as EPSG:n, or EPSG:n+m with m the system of the heights; or remove the line, and state it: --crs"
+SMALLEST_UNIT, LARGEST_UNIT = 1e-9, 1e9
+"""Metres of a unit of lengths, between these [C]."""
 LONGEST = 20_000
 """Characters of a definition at most [C]."""
 
@@ -74,7 +76,7 @@ def stated_system(text: str) -> StatedSystem | None:
     if LOCAL_NAMES.fullmatch(plain):
         return StatedSystem("")
     if LOCAL_WKT.match(plain):
-        factor = float(found[1]) if (found := UNIT_WKT.search(plain)) else 1.0
+        factor = _unit_of_local(plain)
         note = f"local coordinates of a unit of {factor:.7g} m, brought to metres" if factor != 1.0 else ""
         return StatedSystem("", factor, factor, note)
     utm, codes = UTM.fullmatch(plain), CODES.fullmatch(plain)
@@ -87,6 +89,26 @@ def stated_system(text: str) -> StatedSystem | None:
         raise InputError(f"the coordinate system '{plain[:120]}' states {left[0]}, which is not used", REMEDY)
     system = _read(plain) or _of_damaged(plain)
     return None if system is None else _in_metres(_without_shift(system, text), text)
+
+
+def _unit_of_local(text: str) -> float:
+    """Metres in the unit of local coordinates as WKT.
+
+    Raises
+    ------
+    InputError
+        When it is no number greater than 0.
+    """
+    found = UNIT_WKT.search(text)
+    if found is None:
+        return 1.0
+    try:
+        factor = float(found[1])
+    except ValueError:
+        factor = float("nan")
+    if not SMALLEST_UNIT < factor < LARGEST_UNIT:
+        raise InputError(f"the coordinate system '{text[:80]}' states a unit of '{found[1][:20]}' m", REMEDY)
+    return factor
 
 
 def geographic_of(crs: str) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from aerotri.diagnosis.finding import Finding
 from aerotri.diagnosis.moving_errors import WORTH_SAYING
 from aerotri.results.adjusted_block import AdjustedBlock
-from aerotri.results.model_part import ModelPart, OtherSet
+from aerotri.results.model_part import LEAST_DIFFERENCE, ModelPart, OtherSet
 
 
 def growth(other: OtherSet) -> float:
@@ -41,8 +41,13 @@ def of_other_set(adjusted: AdjustedBlock) -> list[Finding]:
     if adjusted.model_part is None or other is None or not np.isfinite(other.height_m):
         return []
     name, text = "another set of parameters", "changes points by less than σ"
-    value = f"heights {other.height_m:.2g} m, {other.height_sigma:.1f} times σ"
+    worst = ("heights", other.height_m, other.height_sigma), ("positions", other.plan_m, other.plan_sigma)
+    what, size_m, ratio = max(worst, key=lambda one: one[2])
+    value = f"{what} {size_m:.2g} m, {ratio:.1f} times σ"
     said = other_set_in_words(adjusted.model_part)
     if said:
         return [Finding(name, value, text, said, "attention")]
-    return [Finding(name, value, text, f"{other.set} predicts as well, and changes little", "good")]
+    little = "changes little" if ratio <= LEAST_DIFFERENCE else "adds little to the total σ"
+    explained = ratio > LEAST_DIFFERENCE and other.share == 0.0
+    why = "the σ of both explain the difference" if explained else little
+    return [Finding(name, value, text, f"{other.set} predicts as well, and {why}", "good")]

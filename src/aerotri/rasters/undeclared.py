@@ -53,8 +53,8 @@ def refuse_undeclared_no_data(reader: RasterReader, metre: float) -> None:
             continue
         low, high, unit = float(rest.min()), float(rest.max()), "m" if metre == 1.0 else f"units of {metre:.7g} m"
         raise InputError(
-            f"has cells of exactly {value:.10g} {unit} among heights of {low:.4g} to {high:.4g} {unit}, and cliffs around them "
-            "everywhere: they look like cells without data, which the file does not declare",
+            f"has cells of exactly {value:.10g} {unit} among heights of {low:.4g} to {high:.4g} {unit}, and cliffs "
+            "around them everywhere: they look like cells without data, which the file does not declare",
             f"declare them: gdal_edit.py -a_nodata {value:.10g} {reader.path.name}; if they are heights, declare a "
             "value that does not occur, such as -a_nodata -9999",
             reader.path,

@@ -186,7 +186,7 @@ ADJUSTMENT = (
     Item("model_part.tests[].reason", "text", "Why there was no test; else empty."),
     Item("model_part.ratio_plan", "number", "Total σ over σ of the noise in X and Y, median of the points."),
     Item("model_part.ratio_height", "number", "The same in Z."),
-    Item("model_part.reason", "text", "Why there is no model part; else empty."),
+    Item("model_part.reason", "text", "Why no groups of photographs add to σ; else empty."),
     Item(
         "model_part.control",
         "object?",

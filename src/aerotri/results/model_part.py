@@ -179,8 +179,8 @@ class ModelPart:
     clusters : their number. method : GROUPS where σ is from the clusters themselves, FIELD where they are too few and a
         random field of each stands for them. level : of the test.
     tests : of all schemes.
-    ratio_plan, ratio_height : median of σ total over σ of the object points, 1 where there is no model part.
-    reason : why there is no model part, '' otherwise.
+    ratio_plan, ratio_height : median of σ total over σ of the object points, 1 where nothing adds to σ.
+    reason : why no clusters add to σ, '' where they do; another set may add to it all the same.
     control : what control points say; None where there are none. common : the parts of σ of the points.
     other_set : parameters that predict as well as those taken and give another object; None where there are none.
     """

@@ -151,6 +151,28 @@ def test_rigs(tmp_path):
     assert again.images.columns["station"].tolist() == ["0", "1", "2", "0", "1", "2"]
 
 
+def test_points_that_another_component_sees(tmp_path):
+    """They have places in axes of their own, while photographs are brought into those of the active component."""
+    sample = Sample("local")
+    path = sample.write(tmp_path, ".psz")
+    with zipfile.ZipFile(path) as file:
+        files = {name: file.read(name) for name in file.namelist()}
+    text = re.sub(r'(<camera id="12")', r'\1 component_id="1"', files["doc.xml"].decode())
+    active = re.search(r"<transform><rotation>.*?</transform>", text, re.DOTALL)[0]
+    other = active.replace("<scale>100.0<", "<scale>50.0<")
+    parts = f'<component id="0">{active}</component><component id="1">{other}</component>'
+    text = text.replace("<frames", f'<components active_id="0">{parts}</components><frames')
+    path.write_bytes(archive(files | {"doc.xml": text.encode()}))
+    reading = read_metashape_project(path)
+    assert np.isfinite(reading.block.images.centre).all()
+    of_point = np.array([int(name[1:]) - 1000 for name in reading.block.points[5:].tolist()])
+    elsewhere = sample.seen[2, of_point]
+    assert 5 < np.sum(elsewhere) < len(elsewhere) - 5
+    points = local(reading)[2][5:]
+    assert np.isnan(points[elsewhere]).all()
+    np.testing.assert_allclose(points[~elsewhere], sample.points[of_point[~elsewhere]], atol=1e-4)
+
+
 def test_without_orientation_and_transform(tmp_path):
     """References alone give a block that can be adjusted from its image points."""
     path = Sample("utm").write(tmp_path, ".xml")

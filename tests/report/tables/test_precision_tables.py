@@ -41,17 +41,21 @@ def test_ellipsoids_by_hand(adjusted):
 
 
 def test_common_and_local_parts(adjusted):
-    """.3 and .4 m make .5 m: 36 and 64 % of the variance; no column of the noise where that is all."""
+    """.3 and .4 m make .5 m: 36 and 64 % of the variance; no column of the noise where that is all.
+
+    Whatever adds to it: groups of photographs, or another set of parameters.
+    """
     assert precision_tables.common(adjusted).rows == ()
     parts = (
         CommonPart("height: tilt", 0.1, 0.3),
         CommonPart("height: local", 0.2, 0.4),
         CommonPart("plan: local", 0, 0),
     )
-    found = precision_tables.common(replace(adjusted, model_part=ModelPart(scheme="strip", common=parts)))
+    found = precision_tables.common(replace(adjusted, model_part=ModelPart(common=parts)))
     assert [row[2:4] for row in found.rows] == [(0.1, 0.3), (0.2, 0.4), (0, 0)]
     assert [row[4] for row in found.rows[:2]] == pytest.approx([36.0, 64.0])
-    plain = precision_tables.common(replace(adjusted, model_part=ModelPart(common=parts)))
+    noise = tuple(replace(part, sigma_m=part.total_m) for part in parts)
+    plain = precision_tables.common(replace(adjusted, model_part=ModelPart(common=noise)))
     assert [column.name for column in plain.columns] == ["part", "what it is", "total σ", "share of the variance"]
 
 

@@ -113,12 +113,10 @@ def read_metashape_project(path: FilePath, pixel_um: float | None = None) -> Rea
     )
     cameras = tuple(sensor.camera for sensor in photographs.sensors.values())
     rigs, station = _rigs(photographs)
-    centre, rotation, of_parts = _poses(photographs, chunk, path)
-    known = np.asarray(np.isfinite(centre).all(axis=1))
-    if of_parts:
-        # their tie points have places in axes that lead nowhere
-        meeting = np.bincount(ties.point[known[ties.image]] - len(labels), minlength=len(start)) > 0
-        start = np.where(meeting[:, None], start, np.nan)
+    centre, rotation, elsewhere, of_parts = _poses(photographs, chunk, path)
+    # tie points of other components have places in axes of their own
+    strange = ties.point[elsewhere[ties.image]] - len(labels)
+    start[strange] = np.nan
     block = Block(
         name=path.stem,
         cameras=with_same_lens(cameras),
@@ -188,13 +186,16 @@ def _rigs(photographs: _Photographs) -> tuple[tuple[Rig, ...], np.ndarray]:
     return tuple(out), np.array(station, dtype=object)
 
 
-def _poses(photographs: _Photographs, chunk: Element, path: Path) -> tuple[np.ndarray, np.ndarray, list[str]]:
+def _poses(
+    photographs: _Photographs, chunk: Element, path: Path
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
     """(n, 3) projection centres and (n, 3, 3) rotations camera → chunk, NaN where there are none; what to say.
 
-    Those of components with a transformation of their own are brought into the axes of the active one.
+    Those of components with a transformation of their own are brought into the axes of the active one; between, (n,)
+    bool, which photographs are of other components than that.
     """
     count = len(photographs.elements)
-    centre, rotation = no_sigma(count), np.full((count, 3, 3), np.nan)
+    centre, rotation, elsewhere = no_sigma(count), np.full((count, 3, 3), np.nan), np.zeros(count, bool)
     others, left = other_components(chunk, path), Counter[str]()
     for row, node in enumerate(photographs.elements):
         found = node.find("transform")
@@ -202,6 +203,7 @@ def _poses(photographs: _Photographs, chunk: Element, path: Path) -> tuple[np.nd
             label = node.get("label", "")
             matrix = numbers(found, 16, f"the transform of photograph '{label}'", path).reshape(4, 4)
             turn = rotation_of(matrix[:3, :3].ravel(), f"the transform of photograph '{label}'", path)
+            elsewhere[row] = node.get("component_id", "") in others
             part, between = others.get(node.get("component_id", ""), ("", (np.eye(3), np.zeros(3), 1.0)))
             if between is None:
                 left[part] += 1
@@ -214,7 +216,7 @@ def _poses(photographs: _Photographs, chunk: Element, path: Path) -> tuple[np.nd
         )
         for part, n in left.items()
     ]
-    return centre, rotation, said
+    return centre, rotation, elsewhere, said
 
 
 def _tie_points(

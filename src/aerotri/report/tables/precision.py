@@ -118,7 +118,7 @@ def common(adjusted: AdjustedBlock) -> Table:
         "One common error, or many local ones",
         (Column("part"), [name for name, *_ in rows]),
         (Column("what it is"), [says for _, says, _ in rows]),
-        *(noise if part is not None and part.counts else []),
+        *(noise if any(one.total_m != one.sigma_m for *_, one in rows) else []),
         (Column("total σ", "m", ".3g"), [one.total_m for *_, one in rows]),
         (
             Column("share of the variance", "%", ".0f"),
