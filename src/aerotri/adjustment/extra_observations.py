@@ -13,6 +13,7 @@ from aerotri.adjustment.datum import ExtraObservations
 from aerotri.adjustment.exposures import exposures_of
 from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.adjustment.position_errors import KIND, error_nodes
+from aerotri.adjustment.track_velocity import track_velocities
 from aerotri.adjustment.unknowns import State, Unknowns, keep_points
 from aerotri.conventions import InputError
 from aerotri.functional_model.constraints import NO_BASIS, Constraint, ConstraintObservations, flat_basis
@@ -158,7 +159,7 @@ def _centres(observed: GnssIns, unknowns: Unknowns, state: State) -> CentreObser
         offset = _columns(unknowns, "gnss.time_offset", ("",), _groups(settings.time_offset, strips), known[:, :1])[
             :, 0
         ]
-        velocity = _velocities(state.centre[row], time, strips)
+        velocity = _velocities(unknowns, state, row)
     return CentreObservations(
         labels=block.images.names[observed.image[used]],
         image=row,
@@ -191,15 +192,12 @@ def _lever_columns(unknowns: Unknowns) -> np.ndarray:
     )
 
 
-def _velocities(centre: np.ndarray, time: np.ndarray, strips: np.ndarray) -> np.ndarray:
-    """(g, 3) m/s along the track of each strip; 0 for a strip of one."""
-    velocity = np.zeros_like(centre)
-    for strip in set(strips.tolist()):
-        own = np.flatnonzero(strips == strip)
-        own = own[np.argsort(time[own])]
-        if len(own) > 1 and (np.diff(time[own]) > 0).all():
-            velocity[own] = np.gradient(centre[own], time[own], axis=0)
-    return velocity
+def _velocities(unknowns: Unknowns, state: State, row: np.ndarray) -> np.ndarray:
+    """(g, 3) m/s along the track at photographs, rows (g,) of those that take part; 0 where nothing tells it."""
+    wanted = np.zeros(len(unknowns.images), dtype=bool)
+    wanted[row] = True
+    unstated = np.full(len(unknowns.images), np.nan)
+    return track_velocities(unknowns.block, unknowns.images, state.centre, wanted, unstated).velocity[row]
 
 
 def _attitudes(observed: GnssIns, unknowns: Unknowns, state: State) -> AttitudeObservations | None:
