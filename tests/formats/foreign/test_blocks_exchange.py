@@ -188,3 +188,15 @@ def test_photographs_in_local_axes_and_control_on_the_earth(tmp_path):
     assert reading.block.crs == "EPSG:25832"
     assert np.isnan(reading.block.images.centre).all()
     assert any("no start orientations" in message for message in reading.messages)
+
+
+@pytest.mark.parametrize("system", ["utm", "earth", "local"])
+def test_the_order_of_opencv(tmp_path, system):
+    """Some programs write OpenCV's p1 and p2: the image points tell, and that is said."""
+    text = BlocksExchange(system).text()
+    text = re.sub(r"<P1>(.*?)</P1><P2>(.*?)</P2>", r"<P1>\2</P1><P2>\1</P2>", text)
+    reading = read(tmp_path, text)
+    assert max(fit_px(reading.messages)) < 1e-3
+    assert any("P1 and P2 are taken in OpenCV's order" in message for message in reading.messages)
+    (camera,) = reading.block.cameras
+    assert (camera.lens["p1"].value, camera.lens["p2"].value) == (-LENS["P2"], LENS["P1"])

@@ -15,6 +15,7 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted
 from aerotri.formats.assembly.parts import Reading, no_sigma
+from aerotri.formats.foreign.blocks_exchange_lens import with_settled_lens
 from aerotri.formats.foreign.blocks_exchange_xml import (
     REMEDY,
     USED,
@@ -116,7 +117,8 @@ def read_blocks_exchange(
     reading = _local_block(chosen, photos, control, ties, pixel_um)
     messages += [*_about_photos(photos, pixel_um), *_about_points(control, ties), *_not_used(chosen)]
     reading, said = _in_its_system(reading, photos, control, path, geoid)
-    return replace(reading, messages=(*messages, *said))
+    block, about_lens = with_settled_lens(reading.block, geoid)
+    return replace(reading, block=block, messages=(*messages, *said, *about_lens))
 
 
 def _largest_block(root: Element, path: Path) -> tuple[XmlPlace, list[str]]:
