@@ -1,7 +1,10 @@
 """Coordinate systems as lists name them: the same system, units taken off, what cannot be used refused."""
 
+import re
+
 import numpy as np
 import pytest
+from pyproj import CRS
 
 from aerotri.conventions import InputError
 from aerotri.coordinates.stated_systems import stated_system
@@ -54,6 +57,12 @@ def test_units_become_factors_and_are_told(text, crs, plan, height):
 def test_units_of_local_coordinates_that_are_none(unit):
     with pytest.raises(InputError, match=f"states a unit of '{unit}' m"):
         stated_system(f'LOCAL_CS["Local",LOCAL_DATUM["Local",0],UNIT["metre",{unit}]]')
+
+
+def test_a_unit_of_nothing_of_a_projection():
+    text = re.sub(r'UNIT\["metre",1', 'UNIT["metre",0', CRS("EPSG:32632").to_wkt("WKT1_GDAL"))
+    with pytest.raises(InputError, match=r"states a unit of '0\.0' m"):
+        stated_system(text)
 
 
 @pytest.mark.parametrize("text", ["", "gcp", "hello", "EPSG:999999", "WGS84 UTM 61N", "a.jpg 1 2 3", "x" * 30_000])

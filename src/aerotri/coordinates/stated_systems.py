@@ -76,7 +76,7 @@ def stated_system(text: str) -> StatedSystem | None:
     if LOCAL_NAMES.fullmatch(plain):
         return StatedSystem("")
     if LOCAL_WKT.match(plain):
-        factor = _unit_of_local(plain)
+        factor = _metres(found[1], plain) if (found := UNIT_WKT.search(plain)) else 1.0
         note = f"local coordinates of a unit of {factor:.7g} m, brought to metres" if factor != 1.0 else ""
         return StatedSystem("", factor, factor, note)
     utm, codes = UTM.fullmatch(plain), CODES.fullmatch(plain)
@@ -91,23 +91,20 @@ def stated_system(text: str) -> StatedSystem | None:
     return None if system is None else _in_metres(_without_shift(system, text), text)
 
 
-def _unit_of_local(text: str) -> float:
-    """Metres in the unit of local coordinates as WKT.
+def _metres(stated: str | float, text: str) -> float:
+    """Metres in the unit that the system in a text states.
 
     Raises
     ------
     InputError
         When it is no number greater than 0.
     """
-    found = UNIT_WKT.search(text)
-    if found is None:
-        return 1.0
     try:
-        factor = float(found[1])
+        factor = float(stated)
     except ValueError:
         factor = float("nan")
     if not SMALLEST_UNIT < factor < LARGEST_UNIT:
-        raise InputError(f"the coordinate system '{text[:80]}' states a unit of '{found[1][:20]}' m", REMEDY)
+        raise InputError(f"the coordinate system '{text[:80]}' states a unit of '{str(stated)[:20]}' m", REMEDY)
     return factor
 
 
@@ -169,9 +166,9 @@ def _in_metres(system: CRS, text: str) -> StatedSystem:
     if system.is_geocentric:
         message = f"the coordinates are earth-centred ('{system.name}')"
         raise InputError(message, "transform them to a system with X, Y and heights, such as UTM")
-    plan = 1.0 if parts[0].is_geographic else float(axes[0].unit_conversion_factor)
+    plan = 1.0 if parts[0].is_geographic else _metres(axes[0].unit_conversion_factor, text)
     heights = axes[2:] or (parts[1].axis_info if len(parts) > 1 else [])
-    height = float(heights[0].unit_conversion_factor) if heights else 1.0 if plan == 1.0 else float("nan")
+    height = _metres(heights[0].unit_conversion_factor, text) if heights else 1.0 if plan == 1.0 else float("nan")
     flat = parts[0].to_2d() if len(axes) == 3 and len(parts) == 1 else parts[0]
     found = crs_text(flat if plan == 1.0 else _metric(flat))
     if len(parts) > 1:

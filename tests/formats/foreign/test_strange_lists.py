@@ -214,9 +214,25 @@ def test_sigma_counts_as_its_coordinate(control):
         np.testing.assert_allclose(found.sigma, [[1.0, 1.0, 0.3048] if "lon" in plan else [0.3048] * 3])
 
 
-def test_decimal_commas_are_none_of_names(control):
-    found = control("name;X;Y;Z\n1,5;8,1;50;1000\n")
-    assert (found.points.tolist(), found.xyz.tolist()) == (["1,5"], [[8.1, 50, 1000]])
+def test_accuracies_of_lists_without_names_count_as_coordinates(control):
+    found = control("# CRS: EPSG:2263+6360\nA,1000,2000,30,1,2\n")
+    np.testing.assert_allclose(found.sigma, [np.multiply([1, 1, 2], US_FOOT)])
+    np.testing.assert_allclose(control("# CRS: EPSG:4326\nA,50,8,30,1,2\n").sigma, [[1, 1, 2]])
+
+
+def test_plain_orientations_have_the_system_of_the_comment(tmp_path):
+    (tmp_path / "opk.txt").write_text("# CRS: EPSG:2263+6360\nA 1000 2000 30 1 2 3\n")
+    found = read_orientations(str(tmp_path / "opk.txt"), ReadingOptions())
+    assert found.crs == "EPSG:32118+5703"
+    np.testing.assert_allclose(found.centre, [np.multiply([1000, 2000, 30], US_FOOT)])
+
+
+def test_names_stay_as_they_are(control):
+    """Neither a decimal comma nor a minus of theirs is one of a number."""
+    for separator, name in ((";", "1,5"), (";", "A\u22121"), (",", "A\u22121")):
+        row = separator.join([name, "8.1", "\u221250", "1000"])
+        found = control(f"{separator.join(('name', 'X', 'Y', 'Z'))}\n{row}\n")
+        assert (found.points.tolist(), found.xyz.tolist()) == ([name], [[8.1, -50, 1000]])
 
 
 def test_many_columns_are_counted(control):

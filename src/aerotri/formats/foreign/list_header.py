@@ -26,6 +26,7 @@ LETTERS = {"P": "name", "N": "Y", "E": "X", "Z": "Z", "X": "X", "Y": "Y", "H": "
 """Letters of --columns: point, northing, easting, height, description."""
 COORDINATES = ("X", "Y", "Z", "lon", "lat")
 SEPARATORS = ",;\t|"
+NUMBER_WITH_COMMA = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +167,7 @@ def cells(line: str, separator: str | None) -> list[str]:
     except csv.Error:
         # a cell longer than any name or number
         return [line[:LONGEST_NAME]]
-    return [word.strip().replace("\u2212", "-") for word in words if separator is not None or word]
+    return [word.strip() for word in words if separator is not None or word]
 
 
 def check_header(file: TextFile, header: Header) -> None:
@@ -237,4 +238,10 @@ def _agreed(file: TextFile, row: int, stated: tuple[ListColumn, ...], words: lis
 
 
 def _is_number(word: str) -> bool:
-    return all_numbers([word.replace(",", ".", 1)])
+    return all_numbers([plain_number(word, decimal_comma=True)])
+
+
+def plain_number(word: str, decimal_comma: bool) -> str:
+    """A number with a minus as it is printed, or a decimal comma, as one that can be read; other words as they are."""
+    word = word.replace("\u2212", "-")
+    return word.replace(",", ".") if decimal_comma and NUMBER_WITH_COMMA.fullmatch(word) else word

@@ -8,7 +8,6 @@ list one of EPSG:4326, unless a comment or a column names its coordinate system.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from aerotri.coordinates.georeference import is_projected
 from aerotri.coordinates.stated_systems import StatedSystem, geographic_of
 from aerotri.crs_text import plan_of
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, texts
-from aerotri.formats.foreign.list_header import Header, cells, check_header, header_of, rows_below
+from aerotri.formats.foreign.list_header import Header, cells, check_header, header_of, plain_number, rows_below
 from aerotri.formats.foreign.list_systems import (
     exchange_in_words,
     in_words,
@@ -111,8 +110,8 @@ def _read(path: Path, columns: str = "") -> _List:
     by_meaning = {
         column.meaning: [words[row][i] for row in rows] for i, column in enumerate(header.columns) if column.meaning
     }
-    if header.separator != ",":
-        by_meaning |= {name: list(map(_with_point, by_meaning[name])) for name in by_meaning if name not in TEXTS}
+    for name in by_meaning.keys() - set(TEXTS):
+        by_meaning[name] = [plain_number(word, header.separator != ",") for word in by_meaning[name]]
     system, notes = _system(everything, header, by_meaning)
     above = [line for line in everything.lines[: header.line or 0] if not line.startswith("#")]
     titles = (left_behind(f"{path.name}: '{line[:60]}' above the names of the columns is not used") for line in above)
@@ -125,11 +124,6 @@ def _without_surplus(file: TextFile, row: int, header: Header) -> list[str]:
     while len(words) > len(header.columns) and not words[-1]:
         words.pop()
     return words
-
-
-def _with_point(word: str) -> str:
-    """A number with a decimal comma as one with a point."""
-    return word.replace(",", ".") if re.fullmatch(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?", word) else word
 
 
 def _system(file: TextFile, header: Header, columns: dict[str, list[str]]) -> tuple[StatedSystem, tuple[str, ...]]:

@@ -14,6 +14,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.parts import OrientationList, texts
 from aerotri.formats.foreign.list_header import is_named
+from aerotri.formats.foreign.list_systems import refuse_unknown_heights, system_above
 from aerotri.formats.text.tables import LARGEST_FORMAT_PX, SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, first_lines
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -50,8 +51,12 @@ def read_orientation_list(path: FilePath) -> OrientationList:
     file.check_names(names, rows, "photograph")
     file.refuse_repeated(names, rows, "photograph")
     values = file.table([line[1:] for line in words], rows, "value")
-    rotation = rotation_from_angles(np.radians(values[:, 3:]))
-    return OrientationList(file.path, texts(names), np.full(len(names), ""), values[:, :3], rotation)
+    system, said = system_above(file.path)
+    refuse_unknown_heights(file, system, values[:, 2])
+    centre, rotation = values[:, :3] * system.to_metre, rotation_from_angles(np.radians(values[:, 3:]))
+    return OrientationList(
+        file.path, texts(names), np.full(len(names), ""), centre, rotation, messages=said, crs=system.crs
+    )
 
 
 def is_ortho_camera(path: Path) -> bool:

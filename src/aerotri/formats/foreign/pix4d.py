@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted
+from aerotri.coordinates.stated_systems import StatedSystem
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, no_sigma, texts
@@ -112,9 +113,9 @@ def read_pix4d_gcp(path: FilePath, axes: str | None = None, crs: str = "") -> Po
         With the line.
     """
     file, names, values = _rows(Path(path), GCP_WIDTHS, "label,c1,c2,z, then acc_h,acc_v or not", "point")
-    xyz, crs, messages = _placed(file, values, axes, crs)
-    sigma = _spread(file, values[:, 3:], may_be_zero=True)
-    return PointList(file.path, texts(names), xyz, sigma, np.zeros(len(names), bool), crs, messages=messages)
+    xyz, system, messages = _placed(file, values, axes, crs)
+    sigma = _spread(file, values[:, 3:], may_be_zero=True) * system.to_metre
+    return PointList(file.path, texts(names), xyz, sigma, np.zeros(len(names), bool), system.crs, messages=messages)
 
 
 def read_pix4d_geo(path: FilePath, axes: str | None = None, crs: str = "") -> PositionList:
@@ -133,21 +134,24 @@ def read_pix4d_geo(path: FilePath, axes: str | None = None, crs: str = "") -> Po
     file, names, values = _rows(Path(path), GEO_WIDTHS, form, "photograph")
     has_angles = values.shape[1] > 5
     angles = np.radians(values[:, 3:6]) if has_angles else no_sigma(len(names))
-    sigma = _spread(file, values[:, 6 if has_angles else 3 :])
-    xyz, crs, messages = _placed(file, values, axes, crs, has_angles)
-    return PositionList(file.path, texts(names), xyz, sigma, angles, crs, messages)
+    xyz, system, messages = _placed(file, values, axes, crs, has_angles)
+    sigma = _spread(file, values[:, 6 if has_angles else 3 :]) * system.to_metre
+    return PositionList(file.path, texts(names), xyz, sigma, angles, system.crs, messages)
 
 
 def _placed(
     file: TextFile, values: np.ndarray, axes: str | None, crs: str, has_angles: bool = False
-) -> tuple[np.ndarray, str, tuple[str, ...]]:
-    """(n, 3) m in the order X, Y, Z, the system that a comment names, and what to say of the list."""
+) -> tuple[np.ndarray, StatedSystem, tuple[str, ...]]:
+    """(n, 3) m in the order X, Y, Z, the system that a comment names, and what to say of the list.
+
+    Accuracies count as the coordinates do, beside degrees in metres [L: Pix4D].
+    """
     system, said = system_above(file.path)
     refuse_unknown_heights(file, system, values[:, 2])
     axes = axes_of(system.crs or crs) if axes is None else axes
     return (
         _ordered(values[:, :3], axes) * system.to_metre,
-        system.crs,
+        system,
         (*_guessed(file, values, axes, has_angles), *said),
     )
 
