@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,9 @@ def test_feet_in_brackets(door, run, name, columns):
     )
     found = run(f"{words} {CAMERA}")
     assert found.exit_code == 0, found.output
-    assert found.output.count("was brought to metres") == columns
+    assert "was brought to metres" in found.output
+    notes = json.loads(Path("B/import.json").read_text(encoding="utf-8"))["taken"]["notes"]
+    assert sum("was brought to metres" in note for note in notes) == columns
     np.testing.assert_allclose(first_point("B"), C01, atol=1e-4)
 
 

@@ -72,7 +72,7 @@ AxesOfLists = Annotated[
     typer.Option(
         help="yx where Y, or the latitude, comes first in lists that do not name their columns. Default: as their "
         "coordinate system has them. In lists with an order of their own (names of columns, gcp_list.txt, geo.txt) yx "
-        "exchanges X and Y, and the screen says so: of the control points, of positions where there are none.",
+        "exchanges X and Y, which is told: of the control points, of positions where there are none.",
         rich_help_panel=INPUT,
     ),
 ]

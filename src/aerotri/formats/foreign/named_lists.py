@@ -228,7 +228,7 @@ def read_positions(path: FilePath, columns: str = "", exchanged: bool = False) -
     angles = np.radians(found.numbers("yaw", "pitch", "roll"))
     angles[np.isnan(angles).any(axis=1)] = np.nan
     sigma, said = _sigma(found)
-    messages = (*_messages(found, "yaw", "pitch", "roll"), *said, *_exchange(found, exchanged))
+    messages = (*_exchange(found, exchanged), *_messages(found, "yaw", "pitch", "roll"), *said)
     order = order_of_axes(exchanged)
     return PositionList(found.file.path, names, xyz[:, order], sigma[:, order], angles, crs, messages, heights)
 
@@ -262,7 +262,7 @@ def read_control_list(path: FilePath, columns: str = "", exchanged: bool = False
     order = order_of_axes(exchanged)
     return PointList(
         found.file.path, names, xyz[:, order], sigma[:, order], roles == "check", crs, heights=heights,
-        messages=(*_messages(found, "role"), *said, *_exchange(found, exchanged)),
+        messages=(*_exchange(found, exchanged), *_messages(found, "role"), *said),
     )  # fmt: skip
 
 
