@@ -35,6 +35,7 @@ INSIDE = {
     "prove/league_programs/colmap.py": "gives pycolmap the observations and the datum of an adjustment in its frame",
     "prove/kill.py": "kills the commands from within",
     "prove/deviations.py": "the sizes of image errors that it simulates, parameter by parameter",
+    "prove/ppk_interpolation.py": "interpolates a trajectory without photographs",
     "prove/model_part.py": "every part of the covariance alone, of clusters of photographs",
     "prove/moving/cases.py": "the strips of a track, as an adjustment finds them",
     "prove/moving/flights.py": "the strips of a track, as an adjustment finds them",
