@@ -344,6 +344,22 @@ def test_control_without_crs_keeps_positions(shift, crs, tmp_path):
         np.testing.assert_allclose(positions.xyz[0, :2], [500000.0, 5316300.0], atol=1000.0)
 
 
+def test_heights_of_a_flight_are_worded_once():
+    """EXIF counts from sea level, and the block names no system: message, import.json and pages say the same of it."""
+    from aerotri.coordinates.crs_names import heights_in_words
+    from aerotri.report.documents.words import Words
+    from aerotri.report.head import crs_rows
+    from aerotri.tie_points.given import Given, positions_in
+
+    said = positions_in(photographs_of_exif(), Given(), "EPSG:32632")[1]
+    words = heights_in_words("EPSG:32632")
+    assert words == "system not named"
+    assert any("count from sea level" in text and words in text for text in said)
+    assert crs_rows(Words("en"), "EPSG:32632")[1][1] == words
+    assert crs_rows(Words("en"), "EPSG:25832+7837")[1][1] == heights_in_words("EPSG:25832+7837") == "DHHN2016 height"
+    assert heights_in_words("local") == ""
+
+
 def test_exif_without_altitude():
     """Longitude and latitude still choose neighbours and the zone; why they are no positions is said."""
     from dataclasses import replace

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-HEIGHTS_NOT_NAMED = "system not named; taken as above the ellipsoid"
-"""Of a block: its frame on the ground takes heights of no system for ellipsoidal ones."""
+HEIGHTS_NOT_NAMED = "system not named"
+"""Heights then count from what those of control points and positions do; the computation takes them for ellipsoidal."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def crs_names(crs: str) -> CrsNames:
 
 
 def heights_in_words(crs: str) -> str:
-    """What the heights of a block count from: the one wording of it, on the screen, in files and on pages.
+    """What heights count from: the one wording of it, on the screen, in files and (translated) on pages.
 
     Parameters
     ----------

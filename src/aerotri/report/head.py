@@ -7,14 +7,12 @@ from aerotri.report.documents.words import Words
 from aerotri.results.head import Head
 
 
-def head_rows(words: Words, head: Head, block: str = "", of_block: bool = True) -> list[tuple[str, str]]:
+def head_rows(words: Words, head: Head, block: str = "") -> list[tuple[str, str]]:
     """Words and texts, in the order of the page; the texts are as the user wrote them.
 
     Parameters
     ----------
     block : its name, where it does not stand in the title.
-    of_block : whether heights whose system is not named are taken for ellipsoidal, as those of a block are; surfaces
-        are compared with one another, whatever their heights count from.
     """
     project = head.project
     stated = (("client", project.client), ("company", project.company), ("operator", project.operator))
@@ -23,7 +21,7 @@ def head_rows(words: Words, head: Head, block: str = "", of_block: bool = True) 
         rows.append((words("head.survey_date"), words.date(project.survey_date)))
     rows += [(words("head.block"), block)] if block else []
     rows += [(words("head.computed"), computed_text(words, head)), (words("head.version"), f"aerotri {head.version}")]
-    rows += crs_rows(words, head.crs, of_block)
+    rows += crs_rows(words, head.crs)
     lines = project.notes.splitlines()
     return rows + [("" if i else words("head.notes"), line) for i, line in enumerate(lines)]
 
@@ -33,7 +31,7 @@ def computed_text(words: Words, head: Head) -> str:
     return words.date(head.computed.strftime("%Y-%m-%d")) + head.computed.strftime(" %H:%M UTC")
 
 
-def crs_rows(words: Words, crs: str, of_block: bool = True) -> list[tuple[str, str]]:
+def crs_rows(words: Words, crs: str) -> list[tuple[str, str]]:
     """Coordinate system by name and code, and the system of the heights."""
     names = crs_names(crs)
     if crs == "local":
@@ -42,5 +40,5 @@ def crs_rows(words: Words, crs: str, of_block: bool = True) -> list[tuple[str, s
         return [(words("head.crs"), crs or words("head.not_stated"))]
     return [
         (words("head.crs"), f"{names.name} ({names.code})"),
-        (words("head.heights"), names.vertical or words("head.no_heights" if of_block else "head.heights_not_named")),
+        (words("head.heights"), names.vertical or words("head.heights_not_named")),
     ]

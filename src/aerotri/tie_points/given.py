@@ -113,8 +113,7 @@ def _with_heights(
     said = []
     if not ellipsoidal.all():
         some = "" if not ellipsoidal.any() else f" of {int((~ellipsoidal).sum())} photographs"
-        about = "count from sea level; they are taken as those of the block's CRS as they are"
-        said.append(assumed(f"heights of EXIF{some} {about}"))
+        said.append(placing.about_sea_level(f"EXIF{some}", crs))
     if ellipsoidal.any() and "+" in crs:
         xyz = xyz.copy()
         xyz[ellipsoidal] = placing.from_ellipsoidal_heights(xyz[ellipsoidal], crs, given.stated.geoid)

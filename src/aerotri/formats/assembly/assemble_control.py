@@ -95,7 +95,7 @@ def _in_block(
         return xyz, (taken(f"{given.path.name}: ellipsoidal heights were brought to those of {block.crs}"),)
     if stated.control_heights == "ellipsoidal":
         raise InputError(
-            f"--control-heights ellipsoidal is not needed: all heights of {block.crs} are ellipsoidal",
+            f"--control-heights ellipsoidal is not needed: {block.crs} names no system of heights to bring them to",
             "leave the option out, or name the height system in --crs, such as EPSG:25832+7837",
         )
     return given.xyz, ()

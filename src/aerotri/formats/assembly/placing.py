@@ -12,6 +12,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates import local_frame
 from aerotri.coordinates.blocks import frame_of_block, transform_block
+from aerotri.coordinates.crs_names import heights_in_words as system_of_heights
 from aerotri.coordinates.ellipsoid import metres_of_units
 from aerotri.coordinates.georeference import (
     CRS_PATTERN,
@@ -141,7 +142,7 @@ def from_gnss(
     name, wanted = given.path.name, crs
     if given.heights == "sea level":
         wanted = plan_of(crs)
-        said = assumed(f"heights of {name} count from sea level; they are taken as those of {crs} as they are")
+        said = about_sea_level(name, crs)
     elif wanted != plan_of(crs):
         said = taken(f"heights of {name} count from the ellipsoid, and were brought to those of {crs}")
     else:
@@ -153,6 +154,12 @@ def from_gnss(
         return to_crs(place, source, wanted, geoid), messages
     except InputError as error:
         raise InputError(error.message, error.remedy, given.path) from error
+
+
+def about_sea_level(name: str, crs: str) -> str:
+    """A note on heights of a file above sea level, which name no system of heights."""
+    own = f"those of {crs}" if crs != plan_of(crs) else f"those of the block ({crs}: {system_of_heights(crs)})"
+    return assumed(f"heights of {name} count from sea level; they are taken as {own} as they are")
 
 
 def about_ellipsoidal(name: str, crs: str) -> str:

@@ -271,7 +271,8 @@ class BlockModel(Section):
     name: str | None = key(None, "Name of the block; that of its folder where it is not given.")
     crs: Annotated[str, Field(pattern=r"^(local|EPSG:[0-9]+(\+[0-9]+)?)$")] = key(
         "local", "Coordinate system of all coordinates: local (right-handed, metres), or an EPSG code such as "
-        "EPSG:25832, with a code for the heights EPSG:25832+7837. Without a code for the heights they are ellipsoidal."
+        "EPSG:25832, with a code for the heights EPSG:25832+7837. Without a code for the heights their system is not "
+        "named, and the computation takes them for ellipsoidal."
     )  # fmt: skip
     angle_unit: Literal["deg", "gon", "rad"] = key("deg", "Unit of all angles in the tables.")
     rotation: Literal["omega-phi-kappa", "phi-omega-kappa"] = key(

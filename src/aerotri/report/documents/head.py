@@ -45,7 +45,7 @@ def document(
     words, project = context.words, context.project
     title = breakable(project.title or context.name)
     head = Head(project, crs, context.made, version)
-    rows = head_rows(words, head, context.name if project.title and context.of_block else "", context.of_block)
+    rows = head_rows(words, head, context.name if project.title and context.of_block else "")
     files = dict(files)
     logo = ""
     if project.logo_content:

@@ -40,7 +40,7 @@ def write_change_page(content: Mapping[str, Any], plots: Mapping[str, RenderedPl
         sure=_sure(content), rows=[_row(one) for one in content["volumes"]], unknowns=_unknowns(content),
         alignment=_alignment(content),
         plots=[(CAPTIONS[name], data_address(plot), name) for name, plot in plots.items()],
-        head=page_head(head, of_block=False), settings=settings_rows(content),
+        head=page_head(head), settings=settings_rows(content),
     )  # fmt: skip
     path.write_text(text, encoding="utf-8")
 

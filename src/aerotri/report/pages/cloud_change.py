@@ -37,7 +37,7 @@ def write_cloud_change_page(
     text = page_environment().get_template("cloud_change.html.j2").render(
         first=printable(content["first"]), second=printable(content["second"]), cards=_cards(content),
         warnings=[sentence(text) for text in content["warnings"]], sure=_sure(content), stable=_stable(content),
-        rows=_rows(content), head=page_head(head, of_block=False), settings=settings_rows(content),
+        rows=_rows(content), head=page_head(head), settings=settings_rows(content),
         plots=[(CAPTIONS[name], data_address(plot), name) for name, plot in plots.items()],
     )  # fmt: skip
     path.write_text(text, encoding="utf-8")

@@ -32,9 +32,9 @@ class PageHead:
     version: str
 
 
-def page_head(head: Head, block: str = "", of_block: bool = True) -> PageHead:
-    """The head as `head.html.j2` shows it; `block` and `of_block` as of `head_rows`."""
-    rows = [(word, printable(text, 4000)) for word, text in head_rows(Words("en"), head, block, of_block)]
+def page_head(head: Head, block: str = "") -> PageHead:
+    """The head as `head.html.j2` shows it; `block` as of `head_rows`."""
+    rows = [(word, printable(text, 4000)) for word, text in head_rows(Words("en"), head, block)]
     return PageHead(printable(head.project.title), logo_address(head.project), tuple(rows), head.version)
 
 

@@ -63,7 +63,7 @@ def product_html(
     """
     pictures = [(caption, data_address(plots[name]), name) for name, caption in parts.captions.items() if name in plots]
     return page_environment().get_template("product.html.j2").render(
-        parts=parts, pictures=pictures, files=files, head=page_head(head, of_block=False),
+        parts=parts, pictures=pictures, files=files, head=page_head(head),
         settings=settings_rows(content),
     )  # fmt: skip
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import counted
+from aerotri.coordinates.crs_names import heights_in_words
 from aerotri.diagnosis.accuracy_rules import cm
 from aerotri.diagnosis.purpose import beside_verdict
 from aerotri.report.pages.dense import dense_parts
@@ -241,13 +242,16 @@ def _figures(folder: Path) -> list[tuple[str, str]]:
     for path in sorted(folder.glob("*.json")):
         content = _read(path)
         shown = {key: value for key, value in content.items() if _is_plain(value) and key not in TECHNICAL}
+        if shown.get("height_system") == "":
+            shown["height_system"] = heights_in_words(str(shown.get("crs", "")))
         found += [(_worded(key), _text(value)) for key, value in shown.items()]
         for key in IN_PARTS:
             if isinstance(content.get(key), dict):
                 found += _parts(_worded(key), content[key])
         said = [*content.get("messages", []), *content.get("notes", [])]
         found += [("", printable(text, 1000)) for text in said if isinstance(text, str)]
-    return found
+    # import.json and tiepoints.json begin with the same
+    return list(dict.fromkeys(found))
 
 
 def _worded(key: str) -> str:

@@ -39,7 +39,7 @@ def volume_html(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot], h
     environment = page_environment()
     return environment.get_template("volume.html.j2").render(
         name=printable(content["dtm"]), base=printable(content["base"]["name"]),
-        boundary=printable(boundary_in_words(content["boundary"])), head=page_head(head, of_block=False),
+        boundary=printable(boundary_in_words(content["boundary"])), head=page_head(head),
         cards=_cards(content),
         warnings=[printable(text, 1000) for text in content["warnings"]], budget=_budget(content),
         methods=_methods(content), settings=settings_rows(content), piles=_piles(content), mass=_mass_words(content),
