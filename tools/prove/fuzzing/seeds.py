@@ -91,6 +91,7 @@ def whole_files() -> list[tuple[str, str, bytes]]:
     scenes = of_tests("test_openmvg")
     found += [("openmvg", "sfm_data.json", json.dumps(scenes.openmvg()).encode())]
     found += [("alicevision", "sfm.sfm", json.dumps(scenes.alicevision(old)).encode()) for old in (True, False)]
+    found += [("nvm", "site.nvm", of_tests("test_nvm").nvm().encode())]
     return [*found, ("pix4d-params", "x.txt", of_tests("test_pix4d_params").params().encode())]
 
 

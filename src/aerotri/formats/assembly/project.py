@@ -40,6 +40,7 @@ from aerotri.formats.foreign.colmap import read_colmap
 from aerotri.formats.foreign.ign import files_of, is_ign, is_ign_camera, read_ign_app, read_ign_camera, read_ign_mes
 from aerotri.formats.foreign.list_header import has_attitudes
 from aerotri.formats.foreign.metashape_project import read_metashape_project
+from aerotri.formats.foreign.nvm import read_nvm
 from aerotri.formats.foreign.openmvg import read_alicevision, read_openmvg
 from aerotri.formats.foreign.opensfm import read_opensfm
 from aerotri.formats.foreign.opensfm_gcp import NAME as OPENSFM_GCP
@@ -59,7 +60,12 @@ IN_PIXELS: Mapping[str, Callable[[Path, float], Reading]] = {
     "opensfm": read_opensfm,
 }
 """Whole blocks in one file that know no size of a pixel."""
-MAY_FREE = ("blocks-exchange", "bundler", "colmap", "metashape-project", "opf", "pix4d-params", *IN_PIXELS)
+WITHOUT_SIZE: Mapping[str, Callable[[Path, float, tuple[int, int] | None], Reading]] = {
+    "bundler": read_bundler,
+    "nvm": read_nvm,
+}
+"""Whole blocks that know no format of the photographs either."""
+MAY_FREE = ("blocks-exchange", "colmap", "metashape-project", "opf", "pix4d-params", *WITHOUT_SIZE, *IN_PIXELS)
 """Whole blocks whose interior elements --free-interior makes unknowns."""
 CONTROL_BESIDE = (OPENSFM_GCP, "gcp_list.txt")
 """Control points of OpenSfM beside its reconstruction."""
@@ -241,18 +247,19 @@ def _as_it_is(request: Request, sources: Sources) -> Reading | None:
     if request.camera != CameraSpec(pixel_um=pixel_um, size_px=size_px, free=may_free):
         remedy = f"leave the options of the camera out; --pixel-um may stay, of {', '.join(MAY_FREE)} --free-interior"
         raise InputError("has cameras of its own", remedy, path)
-    if size_px is not None and kind != "bundler":
+    if size_px is not None and kind not in WITHOUT_SIZE:
         raise InputError("has cameras of its own", "leave --camera-size out", path)
     with_pixels = _with_pixels(kind, path, request)
     if with_pixels is not None:
         return with_pixels
     said = () if pixel_um is not None else (_about_pixel(UNKNOWN_PIXEL_UM),)
-    if kind in ("bundler", "colmap", *IN_PIXELS):
+    if kind in ("colmap", *WITHOUT_SIZE, *IN_PIXELS):
         pixel_um = UNKNOWN_PIXEL_UM if pixel_um is None else pixel_um
         if kind == "colmap":
             (block, points), heard = _with_warnings(lambda pixel=pixel_um: sources.colmap(path, pixel))
             return Reading(block, points, (*heard, *said))
-        read = read_bundler(path, pixel_um, size_px) if kind == "bundler" else IN_PIXELS[kind](path, pixel_um)
+        sized = WITHOUT_SIZE.get(kind)
+        read = IN_PIXELS[kind](path, pixel_um) if sized is None else sized(path, pixel_um, size_px)
         return replace(read, messages=(*read.messages, *_control_beside(path, kind, request.control), *said))
     if pixel_um is not None:
         raise InputError("has cameras of its own", "leave --pixel-um out", path)
