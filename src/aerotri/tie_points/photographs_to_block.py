@@ -13,6 +13,7 @@ from aerotri.adjustment.parallel import thread_count
 from aerotri.conventions import InputError, mm_from_px, real_path
 from aerotri.coordinates.blocks import transform_block
 from aerotri.diagnosis.control_points import doubts_with_orientation
+from aerotri.diagnosis.gnss_heights import doubts_of_gnss_heights
 from aerotri.diagnosis.suspicions import suspicions_of_lists
 from aerotri.execution.work import Workplace
 from aerotri.formats.assembly import assemble
@@ -35,7 +36,7 @@ from aerotri.tie_points.matching import MatchOptions, match_all, neighbours
 from aerotri.tie_points.misfit import adjusted_offsets, with_sigma_of_ties
 from aerotri.tie_points.orientation import Oriented, Progress, in_frame, orient, with_start_values
 from aerotri.tie_points.photographs import LENS, PhotographSet
-from aerotri.tie_points.placed import Placed
+from aerotri.tie_points.placed import CONTROL, Placed
 from aerotri.tie_points.settings import DEFAULTS
 from aerotri.tie_points.tasks import bytes_of_search, features_elsewhere, matches_elsewhere
 from aerotri.tie_points.tracks import Measured, Tracks, join_matches, thin
@@ -128,6 +129,8 @@ def tie_photographs(
     placed_block = in_frame(reading.block, frame)
     found = reproject(*placed_block)
     about_control = (*doubts_with_orientation(*placed_block), *suspicions_of_lists(reading.block))
+    if oriented.placed is not None and oriented.placed.by == CONTROL:
+        about_control += doubts_of_gnss_heights(reading.block)
     local = reading.block if frame is None else transform_block(reading.block, frame)
     offset_px, unsettled = adjusted_offsets(local, found.points, found.offset_px)
     block, sigma_px = with_sigma_of_ties(reading.block, offset_px, len(tracks))
