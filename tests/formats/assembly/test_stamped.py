@@ -266,6 +266,21 @@ def test_time_stamps_beside_the_photographs_of_two_flights(tmp_path):
     assert found.images.tolist() == names
     apart = (found.xyz - np.vstack([cameras(first), cameras(second)])) * metres_of_units(found.xyz)
     np.testing.assert_allclose(apart, 0.0, atol=2e-3)
+    half = len(EPOCHS) // 2
+    (tmp_path / "flight.pos").unlink()
+    (tmp_path / "trajectories").mkdir()
+    for number, part in enumerate((EPOCHS[:half], EPOCHS[half:])):
+        (tmp_path / "trajectories" / f"{number}.pos").write_text(rtklib(part))
+    files = GivenFiles(positions=str(tmp_path / "trajectories"))
+    again = read_given(files, 0.5, photographs).positions
+    assert again is not None
+    near = np.isin(again.images, found.images)
+    assert near.all()
+    assert len(again.images) >= len(names) - 1
+    (tmp_path / "trajectories" / "2.pos").write_text(rtklib(EPOCHS[half - 9 :]))
+    with pytest.raises(InputError, match="covers a time that"):
+        read_given(files, 0.5, photographs)
+    (tmp_path / "trajectories" / "2.pos").unlink()
     sources = sources_of_photographs(photographs, tmp_path, files, None)
     assert [source.holds for source in sources] == ["photographs", "positions", "time stamps", "time stamps"]
 

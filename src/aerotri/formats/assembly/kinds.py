@@ -12,7 +12,7 @@ import numpy as np
 from aerotri.conventions import InputError, regular_file
 from aerotri.formats.assembly.assemble import Statements
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, RayList
-from aerotri.formats.assembly.stamped import events, positions_at, positions_of_stamps
+from aerotri.formats.assembly.stamped import events, joined, positions_at, positions_of_stamps
 from aerotri.formats.assembly.timed import TimeStamps, Trajectory
 from aerotri.formats.files.photograph_files import files_of
 from aerotri.formats.foreign.bingo import is_bingo, read_bingo
@@ -107,6 +107,8 @@ TRAJECTORIES: Mapping[str, tuple[Callable[[Path], bool], Callable[[Path], Trajec
     "grafnav": (lambda path: is_grafnav(path) and not is_named_list(path), read_grafnav),
 }
 DJI_MRK = "dji-mrk"
+OF_TRAJECTORIES = (".pos", ".txt", ".csv")
+"""Endings of files in a folder that may be trajectories."""
 POSITIONS: Kinds = {
     DJI_MRK: (is_dji_mrk, lambda path, _: positions_of_stamps(read_dji_mrk(path))),
     "rtklib": (TRAJECTORIES["rtklib"][0], lambda path, _: events(read_rtklib(path))),
@@ -206,6 +208,7 @@ def read_position_list(
 
     Parameters
     ----------
+    text : also a folder of trajectories, one of each flight.
     time_stamps : file, or folder of files, with the times of photographs, where `text` is a trajectory; '' for those
         that lie beside the photographs.
     photographs : their folder, None where it is not known.
@@ -214,8 +217,8 @@ def read_position_list(
     ------
     InputError
     """
-    kind, path = _trajectory(text)
-    if kind is None:
+    path, found = _trajectories(text)
+    if not found or options.columns:
         if time_stamps:
             message = "is no trajectory, so that --time-stamps says nothing of it"
             raise InputError(message, f"leave it out; trajectories are {', '.join(TRAJECTORIES)}", path)
@@ -223,14 +226,22 @@ def read_position_list(
     files = files_of_stamps(text, time_stamps, photographs)
     if not files:
         return _read(text, POSITIONS, "positions", options)
-    return positions_at(TRAJECTORIES[kind][1](path), [_time_stamps(file) for file in files])
+    whole = joined([TRAJECTORIES[kind][1](file) for kind, file in found], path)
+    return positions_at(whole, [_time_stamps(file) for file in files])
 
 
-def _trajectory(text: str) -> tuple[str | None, Path]:
-    """The kind of a trajectory, None of another file, and its path."""
+def _trajectories(text: str) -> tuple[Path, list[tuple[str, Path]]]:
+    """The path of ``PATH`` or ``kind:PATH``, and kinds and files of the trajectories there, several of a folder."""
     stated, path = split_kind(text, POSITIONS)
-    told = stated or next((name for name, (recognises, _) in TRAJECTORIES.items() if recognises(path)), None)
-    return (told if told in TRAJECTORIES and not path.is_dir() else None), path
+    if not path.is_dir():
+        told = stated or _told(path)
+        return path, [(told, path)] if told is not None and told in TRAJECTORIES else []
+    told = [(_told(file), file) for file in files_of(path, OF_TRAJECTORIES)]
+    return path, [(kind, file) for kind, file in told if kind is not None]
+
+
+def _told(path: Path) -> str | None:
+    return next((name for name, (recognises, _) in TRAJECTORIES.items() if recognises(path)), None)
 
 
 def files_of_stamps(text: str, time_stamps: str, photographs: Path | None = None) -> list[Path]:
@@ -241,7 +252,7 @@ def files_of_stamps(text: str, time_stamps: str, photographs: Path | None = None
     InputError
         When the folder that is stated has none.
     """
-    if not text or _trajectory(text)[0] is None:
+    if not text or not _trajectories(text)[1]:
         return []
     if not time_stamps:
         return [] if photographs is None else list(files_of(photographs, (MRK,)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +94,39 @@ def _is_path(time: np.ndarray) -> bool:
     clock = 1.0 / round(1.0 / usual) if usual < 1.0 else 1.0
     beside = np.abs(time - clock * np.round(time / clock))
     return bool(np.median(np.abs(step - usual)) < EVEN * usual and np.median(beside) < EVEN * clock)
+
+
+def joined(trajectories: Sequence[Trajectory], path: Path) -> Trajectory:
+    """Trajectories of several flights as one.
+
+    Parameters
+    ----------
+    path : of their folder; of a single one its own stays.
+
+    Raises
+    ------
+    InputError
+        When two cover the same time, or differ in datum, heights or clock.
+    """
+    if len(trajectories) == 1:
+        return trajectories[0]
+    flights = sorted(trajectories, key=lambda one: float(one.time[0]))
+    for before, after in pairwise(flights):
+        if (before.datum, before.heights, before.week_known) != (after.datum, after.heights, after.week_known):
+            message = f"does not have the datum, the heights and the weeks of {before.path.name}"
+            raise InputError(message, "export all flights alike", after.path)
+        if after.time[0] <= before.time[-1]:
+            message = f"covers a time that {before.path.name} covers too"
+            raise InputError(message, "keep one trajectory of each flight in the folder", after.path)
+    return replace(
+        flights[0],
+        path=path,
+        time=np.concatenate([one.time for one in flights]),
+        place=np.concatenate([one.place for one in flights]),
+        sigma=np.concatenate([one.sigma for one in flights]),
+        quality=np.concatenate([one.quality for one in flights]),
+        messages=tuple(text for one in flights for text in one.messages),
+    )
 
 
 def positions_at(trajectory: Trajectory, lists: Sequence[TimeStamps]) -> PositionList:
