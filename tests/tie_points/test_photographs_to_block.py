@@ -360,6 +360,15 @@ def test_heights_of_a_flight_are_worded_once():
     assert heights_in_words("local") == ""
 
 
+def test_orientations_name_the_system_of_the_block(tmp_path):
+    from aerotri.formats.foreign.orientation_list import read_orientation_list
+    from aerotri.tie_points.given import Given, crs_of
+
+    (tmp_path / "opk.txt").write_text("# CRS: EPSG:25832\nP1 500000 5316300 900 0 0 0\n")
+    given = Given(orientation=read_orientation_list(tmp_path / "opk.txt"))
+    assert crs_of(photographs_of_exif(), given) == "EPSG:25832"
+
+
 def test_exif_without_altitude():
     """Longitude and latitude still choose neighbours and the zone; why they are no positions is said."""
     from dataclasses import replace
