@@ -399,12 +399,12 @@ def near_in_crs(
         message = "lies near the photographs with longitude and latitude exchanged, not as it stands"
         raise InputError(message, OTHER_AXES, file)
     try:
-        return to_crs(xyz, source, target, geoid), heights_in_words(source, target, file)
+        return to_crs(xyz, source, target, geoid), change_of_heights(source, target, file)
     except InputError as error:
         raise InputError(error.message, error.remedy, file) from error
 
 
-def heights_in_words(source: str, target: str, file: os.PathLike[str]) -> tuple[str, ...]:
+def change_of_heights(source: str, target: str, file: os.PathLike[str]) -> tuple[str, ...]:
     """What to say of the heights of a file in the CRS `source`, brought to `target`, where one names none for them."""
     named, wanted = heights_of(source), heights_of(target)
     if bool(named) == bool(wanted):
