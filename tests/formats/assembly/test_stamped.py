@@ -40,10 +40,11 @@ def flown(tmp_path_factory):
     files = {
         "flight.pos": rtklib(EPOCHS), "flight.txt": grafnav(EPOCHS), "flight.MRK": mrk(TAKEN, error=0.0),
         "single.MRK": mrk(TAKEN, code=16), "late.MRK": mrk(TAKEN, error=18.0), "events.pos": rtklib(TAKEN),
-        "photographs.txt": "".join(f"{name} 0 0 0 0 0 0\n" for name in NAMES),
+        "nothing": "", "photographs.txt": "".join(f"{name} 0 0 0 0 0 0\n" for name in NAMES),
     }  # fmt: skip
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
+    (folder / "nothing").unlink()
     return SimpleNamespace(**{name.replace(".", "_"): folder / name for name in files}, folder=folder)
 
 
@@ -101,6 +102,7 @@ def test_events_are_positions_in_the_order_of_photographs(flown):
         ("flight_pos", "flight_txt", "no file of time stamps"),
         ("flight_MRK", "flight_MRK", "is no trajectory"),
         ("", "flight_MRK", "no trajectory"),
+        ("nothing", "flight_MRK", "no such file"),
     ],
 )
 def test_what_does_not_belong_together_is_refused(flown, positions, stamps, words):

@@ -218,6 +218,8 @@ def read_position_list(
     InputError
     """
     path, found = _trajectories(text)
+    if not path.is_dir():
+        regular_file(path)
     if not found or options.columns:
         if time_stamps:
             message = "is no trajectory, so that --time-stamps says nothing of it"
