@@ -369,6 +369,16 @@ def test_orientations_name_the_system_of_the_block(tmp_path):
     assert crs_of(photographs_of_exif(), given) == "EPSG:25832"
 
 
+def test_positions_in_place_of_exif_are_said():
+    from aerotri.formats.assembly.parts import PositionList, no_sigma
+    from aerotri.tie_points.given import Given, positions_in
+
+    listed = PositionList(Path("places.csv"), np.array(["a.jpg"]), no_sigma(1), no_sigma(1), no_sigma(1))
+    positions, said = positions_in(photographs_of_exif(), Given(positions=listed), "EPSG:32632")
+    assert positions is listed
+    assert said == ("positions of places.csv are used in place of those in EXIF of 2 photographs",)
+
+
 def test_exif_without_altitude():
     """Longitude and latitude still choose neighbours and the zone; why they are no positions is said."""
     from dataclasses import replace

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from aerotri.adjustment.ray_status import some_names
+from aerotri.conventions import counted
 from aerotri.coordinates.georeference import is_projected, utm_crs
 from aerotri.crs_text import plan_of
 from aerotri.formats.assembly import assemble, placing
@@ -72,7 +73,7 @@ def _lie_near(lon_lat_height: np.ndarray, crs: str, xyz: np.ndarray) -> bool:
 def positions_in(photographs: PhotographSet, given: Given, crs: str) -> tuple[PositionList | None, tuple[str, ...]]:
     """Positions in the CRS of the block, from a list or from EXIF."""
     if given.positions is not None:
-        return given.positions, ()
+        return given.positions, _about_list(photographs, given.positions)
     known = np.flatnonzero(np.isfinite(photographs.lon_lat_height).all(axis=1))
     without = _about_heights(photographs)
     if not len(known):
@@ -132,6 +133,13 @@ def _about_rtk(photographs: PhotographSet, known: np.ndarray) -> tuple[str, ...]
     if (quality == SINGLE).any():
         said += "; those of a single point get the σ that these have, whatever XMP states"
     return (taken(said),)
+
+
+def _about_list(photographs: PhotographSet, positions: PositionList) -> tuple[str, ...]:
+    """What to say of positions of a list that stand in place of those of EXIF."""
+    many = counted(int(photographs.in_plan.sum()), "photograph")
+    about = f"positions of {positions.path.name} are used in place of those in EXIF of {many}"
+    return (taken(about),) if photographs.in_plan.any() else ()
 
 
 def _about_heights(photographs: PhotographSet) -> tuple[str, ...]:

@@ -125,3 +125,12 @@ def test_values_beside_cameras_of_files_are_refused(tmp_path):
         with pytest.raises(aerotri.InputError, match=r"the files describe their cameras \(uce\)"):
             cameras_of(spec, found, np.zeros(0, str), np.zeros(0))
     assert cameras_of(CameraSpec(), found, np.zeros(0, str), np.zeros(0)) == found
+
+
+def test_extra_columns_of_gcp_list_are_named(tmp_path):
+    from aerotri.formats.foreign.odm import read_odm_gcp
+
+    rows = ("EPSG:32632", "500000 5300000 10 5 6 a.jpg K1 0.9 note", "500000 5300000 10 7 8 b.jpg K1")
+    (tmp_path / "gcp_list.txt").write_text("\n".join(rows) + "\n")
+    said = read_odm_gcp(tmp_path / "gcp_list.txt").messages
+    assert said == ("gcp_list.txt: what follows the known columns in 1 row was not carried over",)

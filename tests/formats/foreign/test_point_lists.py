@@ -128,6 +128,7 @@ def test_odm_control(tmp_path):
     assert found.messages == (
         "file.txt: the height of 1 point is 0 and taken as known: write NaN if it is unknown",
         "file.txt: the height of 1 point is unknown",
+        "file.txt: what follows the known columns in 1 row was not carried over",
     )
     rays = found.rays
     assert rays is not None

@@ -16,7 +16,7 @@ from aerotri.formats.assembly.kinds import ReadingOptions
 from aerotri.formats.assembly.project import Request, kind_of_source, reading_options
 from aerotri.formats.block.writer import IMPORT
 from aerotri.formats.foreign.ign import is_ign
-from aerotri.formats.text.notes import Kind, Note, kind_of_note
+from aerotri.formats.text.notes import Kind, Note, kind_of_note, without_beginning
 from aerotri.observations import Block
 from aerotri.results.head import Head
 
@@ -134,7 +134,7 @@ class ImportRecord:
             f"Read: {_shown([source.in_words() for source in self.sources])}",
             f"Taken: {_shown([self._counts_in_words(), *self.taken])}",
             f"Assumed: {_shown(self.assumed)}",
-            f"Left behind: {_shown(self.left_behind)}",
+            f"Left behind: {_shown([without_beginning(text) for text in self.left_behind])}",
         )
 
     def _of(self, kind: Kind | str) -> tuple[str, ...]:

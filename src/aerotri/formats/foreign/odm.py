@@ -146,8 +146,19 @@ def read_odm_gcp(path: FilePath, exchanged: bool = False) -> PointList:
             unit="px",
             focal_length_mm=np.full(len(image_place), np.nan),
         ),
-        messages=(*messages, *exchange_in_words(exchanged, file.path), *_about_heights(file.path, xyz[:, 2], "point")),
+        messages=(
+            *messages,
+            *exchange_in_words(exchanged, file.path),
+            *_about_heights(file.path, xyz[:, 2], "point"),
+            *_about_extra(file.path, sum(len(words[row]) > 7 for row in rows)),
+        ),
     )
+
+
+def _about_extra(path: Path, rows: int) -> tuple[str, ...]:
+    """What to say of so many rows with more columns than are known."""
+    about = f"{path.name}: what follows the known columns in {counted(rows, 'row')} was not carried over"
+    return (left_behind(about),) if rows else ()
 
 
 def _point_names(words: list[list[str]], rows: list[int], values: np.ndarray) -> list[str]:
@@ -233,9 +244,7 @@ def read_odm_geo(path: FilePath, exchanged: bool = False) -> PositionList:
     if not there.all():
         about = f"{file.path.name}: {counted(int((~there).sum()), 'position')} without height left out"
         said.append(left_behind(about))
-    if extra:
-        about = f"{file.path.name}: what follows the known columns in {counted(extra, 'row')} was not carried over"
-        said.append(left_behind(about))
+    said += _about_extra(file.path, extra)
     return PositionList(
         file.path,
         texts(names)[there],

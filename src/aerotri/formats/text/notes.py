@@ -40,6 +40,11 @@ def left_behind(text: str) -> Note:
     return Note(text, "left behind")
 
 
+def without_beginning(text: str) -> str:
+    """A sentence on what was left behind, where a heading says so already."""
+    return next((text.removeprefix(words) for words in LEFT_BEHIND if text.startswith(words)), text)
+
+
 def kind_of_note(text: str) -> str:
     """The kind of a sentence, '' of a remark; one that begins as such sentences do tells what was left behind."""
     if isinstance(text, Note):
