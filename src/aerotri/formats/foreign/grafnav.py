@@ -67,32 +67,20 @@ def read_grafnav(path: FilePath) -> Trajectory:
     head = next((row for row, line in enumerate(file.lines) if _is_header(line)), None)
     if head is None:
         raise file.error(0, "does not name its columns", "export latitude, longitude, height and GPS time with names")
-    columns = _columns(file, head)
-    width = columns[-1].word + columns[-1].words
-    rows = [row for row in range(head + 1, len(file)) if not file.lines[row].lstrip(" ,;").startswith("(")]
-    words = [_split(file.lines[row]) for row in rows]
-    if not rows:
-        raise file.error(len(file), "holds no epochs", "export the file anew")
-    for row, line in zip(rows, words, strict=True):
-        if len(line) != width:
-            raise file.error(row, f"the row has {len(line)} entries, {width} are named", "is the file cut off?")
-    reader = _Rows(file, columns, words, rows)
+    reader = _body(file, head)
     time, week_known = _times(reader, file, head)
     back = np.flatnonzero(np.diff(time) <= 0.0)
     if len(back):
-        raise file.error(rows[int(back[0]) + 1], "time does not go on", "export the epochs in their order, each once")
+        raise file.error(
+            reader.rows[int(back[0]) + 1], "time does not go on", "export the epochs in their order, each once"
+        )
     height = next(name for name in HEIGHTS if reader.has(name))
-    place = np.column_stack([reader.degrees("longitude"), reader.degrees("latitude"), reader.numbers(height)])
-    odd = np.flatnonzero((np.abs(place[:, 0]) > 360.0) | (np.abs(place[:, 1]) > 90.0))
-    if len(odd):
-        raise file.error(rows[odd[0]], "the latitude or longitude is none", "check the columns")
-    place[:, 0] -= 360.0 * (place[:, 0] > 180.0)
     datum = next((match[1].strip() for line in file.lines[:head] if (match := DATUM.match(line))), "WGS 84")
-    codes = reader.numbers("q") if reader.has("q") else np.full(len(rows), np.nan)
+    codes = reader.numbers("q") if reader.has("q") else np.full(len(time), np.nan)
     return Trajectory(
         path=file.path,
         time=time,
-        place=place,
+        place=_places(reader, height),
         sigma=_sigmas(reader),
         quality=np.array([QUALITY.get(int(code), "") if np.isfinite(code) else "" for code in codes], dtype="<U12"),
         heights="ellipsoidal" if height in HEIGHTS[:2] else "sea level",
@@ -179,6 +167,36 @@ class _Rows:
             raise self.file.error(self.rows[short], f"the {name} is not in degrees, minutes, seconds", "export degrees")
         size = np.abs(self.file.table(parts, self.rows, name)) @ np.array([1.0, 1.0 / 60.0, 1.0 / 3600.0])
         return np.where([part[0].startswith("-") for part in parts], -size, size)
+
+
+def _body(file: TextFile, head: int) -> _Rows:
+    """The rows below the names of the columns.
+
+    Raises
+    ------
+    InputError
+        When there are none, or one is cut off.
+    """
+    columns = _columns(file, head)
+    width = columns[-1].word + columns[-1].words
+    rows = [row for row in range(head + 1, len(file)) if not file.lines[row].lstrip(" ,;").startswith("(")]
+    words = [_split(file.lines[row]) for row in rows]
+    if not rows:
+        raise file.error(len(file), "holds no epochs", "export the file anew")
+    for row, line in zip(rows, words, strict=True):
+        if len(line) != width:
+            raise file.error(row, f"the row has {len(line)} entries, {width} are named", "is the file cut off?")
+    return _Rows(file, columns, words, rows)
+
+
+def _places(reader: _Rows, height: str) -> np.ndarray:
+    """(n, 3) longitude, latitude, and the height of a column."""
+    place = np.column_stack([reader.degrees("longitude"), reader.degrees("latitude"), reader.numbers(height)])
+    odd = np.flatnonzero((np.abs(place[:, 0]) > 360.0) | (np.abs(place[:, 1]) > 90.0))
+    if len(odd):
+        raise reader.file.error(reader.rows[odd[0]], "the latitude or longitude is none", "check the columns")
+    place[:, 0] -= 360.0 * (place[:, 0] > 180.0)
+    return place
 
 
 def _times(reader: _Rows, file: TextFile, head: int) -> tuple[np.ndarray, bool]:

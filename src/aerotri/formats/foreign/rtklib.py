@@ -86,20 +86,7 @@ def read_rtklib(path: FilePath) -> Trajectory:
         With the line: a row that is cut off, a time or a place that is none, a baseline whose base is not named.
     """
     file = TextFile(Path(path), any_letters=True)
-    headed = [(row, found) for row, line in enumerate(file.lines) if (found := _columns(line)) is not None]
-    if not headed:
-        raise file.error(0, "does not name its columns", REMEDY)
-    columns = headed[0][1]
-    other = next((row for row, found in headed if found != columns), None)
-    if other is not None:
-        raise file.error(other, "names other columns than above", "give a file for each solution")
-    rows = [row for row, line in enumerate(file.lines) if line[0] not in "%#"]
-    if not rows:
-        raise file.error(len(file), "holds no epochs", REMEDY)
-    words = [re.split(r"[\s,;]+", file.lines[row]) for row in rows]
-    for row, line in zip(rows, words, strict=True):
-        if len(line) < columns.used_words:
-            raise file.error(row, f"the row has {len(line)} entries", f"{len(columns.names) + 2} are named; {REMEDY}")
+    columns, rows, words = _body(file)
     time = _times(file, columns, [line[:2] for line in words], rows)
     place, axes, heights = _places(file, columns, words, rows)
     sigma = _sigmas(file, columns, words, rows, axes)
@@ -115,6 +102,31 @@ def read_rtklib(path: FilePath) -> Trajectory:
         twice = int(np.flatnonzero(time == found.time[again[0]])[-1])
         raise file.error(rows[twice], "the time is there twice", "give one solution: forward, backward or combined")
     return found
+
+
+def _body(file: TextFile) -> tuple[_Columns, list[int], list[list[str]]]:
+    """The columns, and the rows of epochs with their words.
+
+    Raises
+    ------
+    InputError
+        When there are none, or one is cut off.
+    """
+    headed = [(row, found) for row, line in enumerate(file.lines) if (found := _columns(line)) is not None]
+    if not headed:
+        raise file.error(0, "does not name its columns", REMEDY)
+    columns = headed[0][1]
+    other = next((row for row, found in headed if found != columns), None)
+    if other is not None:
+        raise file.error(other, "names other columns than above", "give a file for each solution")
+    rows = [row for row, line in enumerate(file.lines) if line[0] not in "%#"]
+    if not rows:
+        raise file.error(len(file), "holds no epochs", REMEDY)
+    words = [re.split(r"[\s,;]+", file.lines[row]) for row in rows]
+    for row, line in zip(rows, words, strict=True):
+        if len(line) < columns.used_words:
+            raise file.error(row, f"the row has {len(line)} entries", f"{len(columns.names) + 2} are named; {REMEDY}")
+    return columns, rows, words
 
 
 def _values(
