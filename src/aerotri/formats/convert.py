@@ -34,6 +34,7 @@ from aerotri.formats.foreign.metashape_camera import write_metashape_camera
 from aerotri.formats.foreign.metashape_cameras import write_metashape_cameras
 from aerotri.formats.foreign.metashape_files import is_metashape_project
 from aerotri.formats.foreign.metashape_project import read_metashape_project
+from aerotri.formats.foreign.micmac import is_micmac, read_micmac
 from aerotri.formats.foreign.nvm import is_nvm, read_nvm
 from aerotri.formats.foreign.odm import write_odm_gcp
 from aerotri.formats.foreign.openmvg import is_alicevision, is_openmvg, read_alicevision, read_openmvg
@@ -59,6 +60,7 @@ RECOGNISERS: Mapping[str, Callable[[Path], bool]] = {
     "bal": is_bal,
     "bundler": is_bundler,
     "nvm": is_nvm,
+    "micmac": is_micmac,
     "opf": is_opf,
     "openmvg": is_openmvg,
     "alicevision": is_alicevision,
@@ -80,6 +82,7 @@ READERS: Mapping[str, Callable[[Path], tuple[Block, np.ndarray | None]]] = {
     "bal": read_bal,
     "bundler": lambda path: _block_and_points(read_bundler(path)),
     "nvm": lambda path: _block_and_points(read_nvm(path)),
+    "micmac": lambda path: _block_and_points(read_micmac(path)),
     "opf": lambda path: _block_and_points(read_opf(path)),
     "openmvg": lambda path: _block_and_points(read_openmvg(path)),
     "alicevision": lambda path: _block_and_points(read_alicevision(path)),

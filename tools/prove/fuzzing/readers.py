@@ -113,6 +113,9 @@ def _projects(written: dict[str, dict[str, bytes]]) -> list[Target]:
     for files in (opf().files(), opf("EPSG:3044", False, "fisheye").files()):
         read_opf = lambda folder: read_project(Request(f"opf:{folder / 'project.opf'}", "x"))  # noqa: E731
         targets.append(Target("opf", files, tuple(files), read_opf))
+    files = seeds.of_tests("test_micmac").files()
+    read_micmac = lambda folder: read_project(Request(f"micmac:{folder / 'Ori-Site'}", "x"))  # noqa: E731
+    targets.append(Target("micmac", files, tuple(files), read_micmac))
     for kind, name, content in seeds.whole_files():
 
         def read_file(folder: Path, kind: str = kind, name: str = name) -> object:

@@ -35,7 +35,7 @@ PROGRAMS = {
     "colmap": "COLMAP", "dbat": "DBAT", "bal": "Bundle Adjustment in the Large",
     "bundler": "Bundler", "opensfm": "OpenSfM", "metashape": "Metashape", "pix4d": "Pix4D", "odm": "OpenDroneMap",
     "ign": "IGN", "patb": "PAT-B", "bingo": "BINGO", "dji": "DJI", "rtklib": "RTKLIB, Emlid Studio",
-    "grafnav": "NovAtel GrafNav", "opf": "PIX4Dmatic", "nvm": "VisualSFM",
+    "grafnav": "NovAtel GrafNav", "opf": "PIX4Dmatic", "nvm": "VisualSFM", "micmac": "MicMac",
     "openmvg": "OpenMVG", "alicevision": "AliceVision, Meshroom", "realitycapture": "RealityCapture, RealityScan",
 }  # fmt: skip
 """The program behind a format, by the beginning of its name; none of lists that many write."""

@@ -40,6 +40,7 @@ from aerotri.formats.foreign.colmap import read_colmap
 from aerotri.formats.foreign.ign import files_of, is_ign, is_ign_camera, read_ign_app, read_ign_camera, read_ign_mes
 from aerotri.formats.foreign.list_header import has_attitudes
 from aerotri.formats.foreign.metashape_project import read_metashape_project
+from aerotri.formats.foreign.micmac import read_micmac
 from aerotri.formats.foreign.nvm import read_nvm
 from aerotri.formats.foreign.openmvg import read_alicevision, read_openmvg
 from aerotri.formats.foreign.opensfm import read_opensfm
@@ -56,10 +57,11 @@ UNKNOWN_PIXEL_UM = 1.0
 """Size of a pixel where nothing tells it; a principal distance of 3000 pixels then reads 3 mm."""
 IN_PIXELS: Mapping[str, Callable[[Path, float], Reading]] = {
     "alicevision": read_alicevision,
+    "micmac": read_micmac,
     "openmvg": read_openmvg,
     "opensfm": read_opensfm,
 }
-"""Whole blocks in one file that know no size of a pixel."""
+"""Whole blocks that know no size of a pixel."""
 WITHOUT_SIZE: Mapping[str, Callable[[Path, float, tuple[int, int] | None], Reading]] = {
     "bundler": read_bundler,
     "nvm": read_nvm,
