@@ -75,8 +75,7 @@ READERS = {
     "pix4d geo": (read_pix4d_geo, GEO),
     "pix4d offset": (read_pix4d_offset, "1 2 3\n"),
     "pix4d camera": (lambda path: read_pix4d_camera(path, 4.0), CAM),
-    "rtklib": (read_rtklib, rtklib(np.arange(3.0), "enu")),
-    "rtklib in minutes": (read_rtklib, rtklib(np.arange(3.0), "dms", "UTC")),
+    "rtklib": (read_rtklib, rtklib(np.arange(3.0), "dms", "UTC")),
     "plain": (read_orientation_list, PLAIN),
 }
 

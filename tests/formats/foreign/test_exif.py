@@ -115,6 +115,7 @@ def test_real_photograph(shared_data):
         (50, "", "fixed", True, (0.01116, 0.01234, 0.02622)),
         (34, "", "float", True, (0.01116, 0.01234, 0.02622)),
         (16, "", "single point", False, (1.5, 1.5, 3.0)),
+        (0, "", "single point", False, (1.5, 1.5, 3.0)),
         (16, ' drone-dji:AltitudeType="RtkAlt"', "single point", True, (1.5, 1.5, 3.0)),
         (50, ' drone-dji:AltitudeType="GpsFusionAlt"', "fixed", False, (0.01116, 0.01234, 0.02622)),
     ],

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
-from aerotri.formats.assembly.timed import FIXED, FLOAT, true_sigma
+from aerotri.formats.assembly.timed import FIXED, FLOAT, NONE, SINGLE, true_sigma
 from aerotri.formats.foreign.dji_mrk import QUALITY
 
 FORMATS = ("JPEG", "TIFF")
@@ -199,6 +199,8 @@ def _rtk(xmp: str) -> tuple[str, bool]:
     """
     flag = re.search(r'RtkFlag\s*(?:=\s*"|>)\s*\+?(\d{1,3})', xmp)
     quality = QUALITY.get(int(flag[1]), "") if flag is not None else ""
+    # without RTK the position is that of the drone's own GNSS all the same
+    quality = SINGLE if quality == NONE else quality
     source = re.search(r'AltitudeType\s*(?:=\s*"|>)\s*(\w+)', xmp)
     return quality, quality in (FIXED, FLOAT) if source is None else source[1].lower() == "rtkalt"
 
