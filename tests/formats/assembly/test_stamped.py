@@ -301,3 +301,13 @@ def test_one_error_of_the_clock_is_no_error_of_numbers(tmp_path):
     # by the camera's clock, so that photographs without a position have the same
     np.testing.assert_allclose(np.diff(found.time), np.diff(TAKEN[1:]), atol=1e-5)
     assert np.abs(found.time - exif(TAKEN[1:]) % 86400.0).max() < 1.0
+
+
+def test_times_that_jump_about_do_not_outweigh_numbers_that_are_all_there(flown):
+    """A camera that writes times up to six seconds late: numbers are believed where none is missing, and only then."""
+    late = exif(TAKEN) + np.random.default_rng(3).integers(0, 7, len(TAKEN))
+    index, said = stamps_of(flown, NAMES, late)
+    assert index == list(range(22))
+    assert "are believed" in said
+    with pytest.raises(InputError, match="do not agree with the time stamps of their numbers"):
+        stamps_of(flown, NAMES[:-2], late[:-2])

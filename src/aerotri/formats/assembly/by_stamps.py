@@ -20,8 +20,11 @@ from aerotri.formats.text.notes import assumed, left_behind
 from aerotri.observations.names import stem
 
 DAY_S = 86400.0
-TIMES_AGREE_S = 1.5
-"""Difference of the clocks around its median up to which times agree [C]: EXIF has whole seconds, which are cut off."""
+TIMES_AGREE_S = 2.0
+"""Difference of the clocks around its median up to which times agree [C]: EXIF has whole seconds, cut off, and some
+cameras write them a second late."""
+CUT_OFF_S = 0.75
+"""The same where times alone tell the photographs apart [C]: half of what is cut off, and a little."""
 FEWEST_TIMES = 3
 """Photographs with times from which times are compared [C]."""
 FEW = 0.1
@@ -102,6 +105,10 @@ def _matched(
     if are_numbers and len(off) <= FEW * found:
         index[off] = -1
         return index, _about_off(stamps, photographs.names[off])
+    if are_numbers and found == len(index) == len(stamp_time):
+        about = f"the times of {len(off)} photographs do not agree with the time stamps of their numbers"
+        told = f"{stamps.files[0].name}: {about}, {_some(photographs.names[off])}; the numbers, all there, are believed"
+        return index, [assumed(told)]
     if are_numbers:
         raise InputError(
             f"the times of {len(off)} of {found} photographs do not agree with the time stamps of their numbers: "
@@ -184,13 +191,13 @@ def _by_time(stamp_time: np.ndarray, time: np.ndarray) -> np.ndarray | None:
         near = _nearest(sorted_time, time - clock)
         left = time - clock - sorted_time[near]
         left = left - np.median(left)
-        fits = np.abs(left) <= TIMES_AGREE_S / 2.0
+        fits = np.abs(left) <= CUT_OFF_S
         scores.append((int(fits.sum()), -float(np.std(left[fits])) if fits.any() else 0.0, clock))
     count, spread, clock = max(scores)
-    others = [s for s in scores if abs(s[2] - clock) > TIMES_AGREE_S and s[0] == count and s[1] > 2.0 * spread - 0.1]
+    others = [s for s in scores if abs(s[2] - clock) > 2.0 * CUT_OFF_S and s[0] == count and s[1] > 2.0 * spread - 0.1]
     near = _nearest(sorted_time, time - clock)
     left = time - clock - sorted_time[near]
-    fits = np.abs(left - np.median(left)) <= TIMES_AGREE_S / 2.0
+    fits = np.abs(left - np.median(left)) <= CUT_OFF_S
     if others or 2 * count < len(time) or len(np.unique(near[fits])) < count:
         return None
     return np.where(fits, order[near], -1)
