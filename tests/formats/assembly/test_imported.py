@@ -134,3 +134,13 @@ def test_extra_columns_of_gcp_list_are_named(tmp_path):
     (tmp_path / "gcp_list.txt").write_text("\n".join(rows) + "\n")
     said = read_odm_gcp(tmp_path / "gcp_list.txt").messages
     assert said == ("gcp_list.txt: what follows the known columns in 1 row was not carried over",)
+
+
+def test_every_format_names_its_program():
+    """A reader that is added names the program behind it, unless many write such lists."""
+    from aerotri.formats.assembly import kinds
+    from aerotri.formats.assembly.imported import program_of
+    from aerotri.formats.convert import READERS
+
+    names = {*READERS, *kinds.RAYS, *kinds.ORIENTATIONS, *kinds.POSITIONS, *kinds.CONTROL}
+    assert {name for name in names if not program_of(name)} == {"csv", "opk-csv", "opk-list"}
