@@ -38,3 +38,10 @@ def inner_points(camera: Camera, n=400, seed=1):
         place = (xy + half) / spacing
         clear &= (np.abs(place - np.round(place)) * spacing > 0.01).all(axis=1)
     return xy[clear].T
+
+
+def sets_of(family: str) -> list[tuple[str, ...]]:
+    """Names of all parameters of a family, in sets whose items do not exclude one another."""
+    items = LINEAR_FAMILIES[family].items
+    choices = [items] if family != "dmc" else [LINEAR_FAMILIES[family].all_items, ("79", "80")]
+    return [tuple(f"{family}.{item}" for item in choice) for choice in choices]

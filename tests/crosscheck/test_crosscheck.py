@@ -135,8 +135,8 @@ def test_photographs_taken_at_the_singularity_of_the_angles():
 
 def test_what_has_no_independent_formula_is_said(adjusted):
     refracted = replace(adjusted.block, settings=replace(adjusted.block.settings, refraction="standard"))
-    unknown_family = with_adjustment(adjusted.block, additional_parameters=(("ebner", ("1",)),))
-    for block, word in ((refracted, "refraction"), (unknown_family, "'ebner'")):
+    unknown_family = with_adjustment(adjusted.block, additional_parameters=(("collocation", ("2x2_x_0_0",)),))
+    for block, word in ((refracted, "refraction"), (unknown_family, "collocation.2x2_x_0_0")):
         check = check_with_paper(replace(adjusted, block=block), adjust)
         assert check.status == "not available"
         assert word in check.reason

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aerotri.crosscheck import paper_block as paper_block_module
 from aerotri.crosscheck import paper_rays
 from aerotri.crosscheck.paper_check import check_with_paper
+from aerotri.crosscheck.paper_families import LINEAR
 from aerotri.pipeline import adjust
 from small_blocks import small_block
 
@@ -22,9 +22,9 @@ def spoil(monkeypatch):
     """Replace the patterns of a linear family by a function of what they were."""
 
     def replace_patterns(family, change):
-        items, model, formula = paper_block_module.LINEAR[family]
-        wrong = (items, model, lambda camera, x, y: change(formula(camera, x, y)))
-        monkeypatch.setitem(paper_block_module.LINEAR, family, wrong)
+        true = LINEAR[family]
+        wrong = replace(true, patterns=lambda camera, x, y, items: change(true.patterns(camera, x, y, items)))
+        monkeypatch.setitem(LINEAR, family, wrong)
 
     return replace_patterns
 

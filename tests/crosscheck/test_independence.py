@@ -7,13 +7,19 @@ import numpy as np
 import pytest
 
 import aerotri
-from aerotri.crosscheck import paper_patterns, paper_rays
-from aerotri.functional_model.additional_parameters import bluh, brown, lens, parameter_set, ultracam_d
+from aerotri.crosscheck import paper_dmc, paper_patterns, paper_rays
+from aerotri.crosscheck.paper_families import LINEAR
+from aerotri.crosscheck.pattern_check import pattern_errors
+from aerotri.functional_model.additional_parameters import brown, lens, parameter_set
+from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
-from aerotri.observations import Camera, Prior
+from family_cameras import camera_for, sets_of
 
 SOURCE = Path(aerotri.__file__).parent
-INDEPENDENT = ("paper_patterns", "paper_rays", "paper_block", "paper_unknowns", "paper_system", "ceres_solver", "start")
+INDEPENDENT = (
+    "paper_patterns", "paper_dmc", "paper_polynomials", "paper_families", "paper_rays", "paper_block", "paper_unknowns",
+    "paper_system", "ceres_solver", "start",
+)  # fmt: skip
 FORBIDDEN = (
     "aerotri.functional_model", "aerotri.adjustment", "aerotri.results", "aerotri.statistics", "aerotri.strategies",
     "aerotri.diagnosis", "aerotri.image_errors",
@@ -52,26 +58,40 @@ def test_imports_nothing_of_the_model_it_checks(module):
         assert not wrong, f"{path} imports {wrong}"
 
 
-def ultracam(flight_axis):
-    size = (11500, 7500) if flight_axis[1] == "y" else (7500, 11500)
-    return Camera("ucd", "ultracam_d", size, 9.0, {"focal_length_mm": Prior(101.4)}, flight_axis=flight_axis)
-
-
-def positions(camera, rng, count=400):
-    return (rng.uniform(-1, 1, (count, 2)) * camera.half_format_mm).T
-
-
 @pytest.mark.parametrize("flight_axis", ["+x", "-x", "+y", "-y"])
-def test_linear_patterns_are_the_same(flight_axis):
-    camera, rng = ultracam(flight_axis), np.random.default_rng(1)
-    x, y = positions(camera, rng)
-    for module, formula in (
-        (bluh, paper_patterns.bluh(x, y, camera.r_max_mm)),
-        (ultracam_d, paper_patterns.ultracam_d(x, y, (2 * camera.half_format_mm[0], 2 * camera.half_format_mm[1]),
-                                               flight_axis)),
-    ):  # fmt: skip
-        ours = parameter_set(module.FAMILY.name, module.FAMILY.items, camera).basis(x, y)
-        np.testing.assert_allclose(formula, ours, rtol=1e-12, atol=1e-12 * np.abs(ours).max())
+@pytest.mark.parametrize("family", LINEAR)
+def test_linear_patterns_are_the_same(family, flight_axis):
+    camera = camera_for(family, flight_axis)
+    for names in sets_of(family):
+        errors = pattern_errors(camera, names)
+        assert set(errors) == set(names)
+        assert max(errors.values()) < 1e-12
+
+
+def test_every_family_but_the_random_field_and_the_change_of_interior_has_a_second_formula():
+    assert set(LINEAR_FAMILIES) - set(LINEAR) == {"collocation", "interior"}
+    for family in LINEAR:
+        assert all(LINEAR[family].knows(item) for item in LINEAR_FAMILIES[family].items)
+        assert not LINEAR[family].knows("nonsense")
+
+
+def test_heads_of_the_dmc_on_their_seams():
+    """On an axis of the image a point belongs to the head to its right, and above it."""
+    camera = camera_for("dmc")
+    x, y = np.array([0.0, 0.0, 20.0, -20.0, 0.0]), np.array([20.0, -20.0, 0.0, 0.0, 0.0])
+    ours = parameter_set("dmc", LINEAR_FAMILIES["dmc"].all_items, camera)
+    np.testing.assert_allclose(paper_dmc.dmc(x, y, "+y", ours.items), ours.basis(x, y), rtol=1e-12, atol=1e-10)
+
+
+def test_the_butterfly_closes_the_seams():
+    """Turns of the heads as models.md prints them, to its digits; signs of the first and third by another rotation."""
+    np.testing.assert_allclose(np.abs(paper_dmc._stitching()), [0.1887, 0.2704, 0.0264], atol=5e-5)
+    up = np.linspace(0.0, paper_dmc.HALF_ALONG, 41)
+    out = np.linspace(0.0, paper_dmc.HALF_ACROSS, 41)
+    columns = paper_dmc._small_turns(0.0 * up, up), paper_dmc._small_turns(out, 0.0 * out)
+    turns = np.array([1.0, *paper_dmc._stitching()])
+    gap = np.concatenate([turns @ [dx for dx, _ in columns[0]], turns @ [dy for _, dy in columns[1]]])
+    assert np.sqrt(np.mean(gap**2)) == pytest.approx(0.87, abs=0.01)
 
 
 def test_patterns_at_the_image_centre_are_zero():

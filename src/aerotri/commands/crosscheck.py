@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def run_crosscheck(source: Path, out: Path | None, as_json: bool) -> int:
-    """Exit code of the command: 0 when everything compared agrees, 1 otherwise; arguments as on the command line."""
+    """Exit code of the command: 0 when the block agrees with its parameters, 1 otherwise; arguments as typed."""
     console = Console(quiet=as_json)
     from aerotri.compiled import compilation_notice
     from aerotri.pipeline import AdjustmentFailedError

@@ -14,6 +14,9 @@ VTPV_LIMIT = 1e-9
 COVARIANCE_LIMIT = 1e-3
 """Largest relative difference of a σ, and largest difference of a correlation, that counts as agreement."""
 
+PATTERN_LIMIT = 1e-9
+"""Largest difference of a pattern, of its largest value, that counts as the same formula: rounding is below 1e-12."""
+
 
 @dataclass(frozen=True, eq=False)
 class Difference:
@@ -91,6 +94,25 @@ def covariance_difference(ours: np.ndarray, peer: np.ndarray, names: np.ndarray)
     return CovarianceDifference(len(ours), float(ratio.max()), float(correlation.max()), str(names[worst]))
 
 
+@dataclass(frozen=True)
+class PatternDifference:
+    """How our formulas and those of the independent model differ, compared directly.
+
+    Parameters
+    ----------
+    names : of the parameters compared, besides the collinearity equations. max : largest difference of a pattern over
+        its largest value. worst : the parameter.
+    """
+
+    names: tuple[str, ...]
+    max: float
+    worst: str
+
+    @property
+    def agrees(self) -> bool:
+        return self.max <= PATTERN_LIMIT
+
+
 @dataclass(frozen=True, eq=False)
 class PeerCheck:
     """The comparison with one peer.
@@ -102,6 +124,8 @@ class PeerCheck:
     solver, iterations, seconds : how the peer solved it.
     observations, unknowns : as the peer counts them. vtpv, vtpv_peer : vᵀPv.
     covariance : of the orientation, None where it is not compared.
+    patterns : our formulas against the peer's, None where they are not compared.
+    checks_parameters : whether the peer has the parameters of the block among its own unknowns.
     notes : what the user has to know about the comparison.
     """
 
@@ -118,6 +142,8 @@ class PeerCheck:
     vtpv_peer: float = np.nan
     differences: tuple[Difference, ...] = ()
     covariance: CovarianceDifference | None = None
+    patterns: PatternDifference | None = None
+    checks_parameters: bool = False
     notes: tuple[str, ...] = field(default=())
 
     @property
@@ -137,28 +163,51 @@ class PeerCheck:
 
 @dataclass(frozen=True, eq=False)
 class CrosscheckResult:
-    """All comparisons of a block."""
+    """All comparisons of a block.
+
+    Parameters
+    ----------
+    parameters : what the block has for parameters, in words such as 'bluh' or 'focal_length_mm'.
+    unknown : those of them that the independent model has no formula for.
+    """
 
     block: str
     checks: tuple[PeerCheck, ...]
+    parameters: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()
+
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """Parameters that no peer has checked: an adjustment freed of them by us says nothing about them."""
+        if any(check.status == "agrees" and check.checks_parameters for check in self.checks):
+            return ()
+        return self.unknown or self.parameters
 
     @property
     def verdict(self) -> str:
-        """'agrees', 'differs' or 'not checked'; a peer that did not converge is a difference."""
+        """'agrees', 'differs', 'parameters not checked' or 'not checked'.
+
+        A peer that did not converge is a difference.
+        """
         if any(check.status in ("differs", "not converged") for check in self.checks):
             return "differs"
-        return "agrees" if any(check.status == "agrees" for check in self.checks) else "not checked"
+        if not any(check.status == "agrees" for check in self.checks):
+            return "not checked"
+        return "parameters not checked" if self.unchecked else "agrees"
 
     @property
     def sentence(self) -> str:
         """The verdict in a line."""
-        parts = []
-        for check in self.checks:
-            if check.status == "agrees":
-                parts.append(f"{check.peer}: max |Δ|/σ {check.max:.2g}, vᵀPv {check.vtpv_difference:+.0e}")
-            else:
-                parts.append(f"{check.peer} {check.status}: {check.reason}")
-        return f"{self.verdict} — {'; '.join(parts)}"
+        verdict = self.verdict
+        if verdict == "parameters not checked":
+            verdict = f"parameters not checked ({', '.join(self.unchecked)})"
+        return f"{verdict} — {'; '.join(self._part(check) for check in self.checks)}"
+
+    def _part(self, check: PeerCheck) -> str:
+        if check.status != "agrees":
+            return f"{check.peer} {check.status}: {check.reason}"
+        freed = " (image points freed of our own errors)" if self.parameters and not check.checks_parameters else ""
+        return f"{check.peer}: max |Δ|/σ {check.max:.2g}, vᵀPv {check.vtpv_difference:+.0e}{freed}"
 
 
 def judge(check: PeerCheck, more: Sequence[str] = ()) -> PeerCheck:
@@ -177,4 +226,6 @@ def judge(check: PeerCheck, more: Sequence[str] = ()) -> PeerCheck:
             f"σ of the orientation by up to {100.0 * check.covariance.sigma:.2g} % and its correlations by "
             f"{check.covariance.correlation:.2g} ({check.covariance.worst})"
         )
+    if check.patterns is not None and not check.patterns.agrees:
+        reasons.append(f"the pattern of {check.patterns.worst} by up to {check.patterns.max:.1e} of itself")
     return replace(check, status="differs" if reasons else "agrees", reason=", ".join(reasons))

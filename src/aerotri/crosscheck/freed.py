@@ -66,10 +66,13 @@ def freed_block(adjusted: AdjustedBlock) -> FreedBlock:
     in_pixels = rays.sigma / pixel[:, None]
     sigma_px = float(np.median(in_pixels[keep]))
     sigma = np.repeat(sigma_px * pixel[:, None], 2, axis=1)
-    cameras = tuple(replace(camera, brown={}) for camera in block.cameras)
-    freed = _with_rays(replace(block, cameras=cameras), keep, oriented.corrected_xy(), sigma)
+    cameras = tuple(replace(camera, brown={}, parameters={}) for camera in block.cameras)
+    xy = oriented.corrected_xy()
+    freed = _with_rays(replace(block, cameras=cameras), keep, xy, sigma)
     by_control = block.settings.adjustment.datum == "control" and block.gnss_ins is None
-    notes = ["image points freed of the adjusted systematic errors; camera held as adjusted"]
+    notes = ["camera held as adjusted"]
+    if (xy != rays.xy).any():
+        notes[0] = f"image points freed of our own systematic errors, which this does not check; {notes[0]}"
     if any(camera.lens for camera in block.cameras):
         notes[0] += ", its lens in COLMAP's own model"
     if np.ptp(in_pixels[keep]) > 1e-9 * sigma_px:

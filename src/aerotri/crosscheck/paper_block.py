@@ -7,14 +7,13 @@ looked at, so that a mistake there shows as a difference.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.crosscheck import paper_patterns as patterns
+from aerotri.crosscheck.paper_families import LINEAR, unknown_parameters
 from aerotri.crosscheck.paper_rays import ELEMENTS, INTERIOR
-from aerotri.observations import Block, Camera, Prior
+from aerotri.observations import Block, Prior
 
 Owner = tuple[str, str]
 """What a shared entry belongs to: ('camera', name), ('group', name) or ('gnss', strip)."""
@@ -22,17 +21,8 @@ Owner = tuple[str, str]
 Removed = frozenset[tuple[str, str]]
 """Names and groups of parameters."""
 
-LINEAR: dict[str, tuple[tuple[str, ...], str | None, Callable[[Camera, np.ndarray, np.ndarray], np.ndarray]]] = {
-    "bluh": (patterns.BLUH_ITEMS, None, lambda camera, x, y: patterns.bluh(x, y, camera.r_max_mm)),
-    "ultracam_d": (
-        patterns.ULTRACAM_ITEMS,
-        "ultracam_d",
-        lambda camera, x, y: patterns.ultracam_d(
-            x, y, (2.0 * camera.half_format_mm[0], 2.0 * camera.half_format_mm[1]), camera.flight_axis or "+y"
-        ),
-    ),
-}
-"""Items, camera model and patterns of the families that are linear in their parameters."""
+MOST_NAMED = 12
+"""Parameters of a family that are named one by one [C]: more fill the message, and stand in the block's settings."""
 
 
 class UnknownToPaperError(Exception):
@@ -160,7 +150,7 @@ def paper_block(
     entries = _Entries(removed)
     setups = list(dict.fromkeys(zip(block.images.camera[images].tolist(), groups.tolist(), strict=True)))
     elements = np.array([_element_entries(block, *setup, entries) for setup in setups])
-    linear = [_linear_entries(block, setup[1], groups, block.images.camera[images], entries) for setup in setups]
+    linear = [_linear_entries(block, *setup, entries) for setup in setups]
     antennas = _antennas(block, images, origin, entries)
     shared, place = entries.sorted()
     number = {setup: k for k, setup in enumerate(setups)}
@@ -181,8 +171,7 @@ def paper_block(
 def _refuse_unknown(block: Block) -> None:
     settings, observed = block.settings, block.gnss_ins
     free = settings.adjustment.is_free
-    families = {family for family, _ in settings.adjustment.additional_parameters}
-    unknown = sorted(families - set(LINEAR) - {"brown", "lens"})
+    unknown = ", ".join(parameters_text(unknown_parameters(all_parameters(block))))
     refused = [
         (block.crs != "local", f"a block in {block.crs}, which is not the frame of its adjustment"),
         (block.constraints is not None and len(block.constraints) > 0, "conditions between points"),
@@ -194,11 +183,30 @@ def _refuse_unknown(block: Block) -> None:
         (settings.gnss.correlated != "off", "GNSS errors that stay for a while"),
         (settings.gnss.noise_factor not in (None, (1.0, 1.0)), "a factor of the σ of GNSS"),
         (settings.refraction != "off" or settings.earth_curvature != "off", "refraction and earth curvature"),
-        (bool(unknown), f"the parameters '{unknown[0] if unknown else ''}'"),
+        (settings.photograph_fields.correlated != "off", "smooth errors of single photographs"),
+        (bool(unknown), f"the parameters {unknown}"),
     ]
     for there, what in refused:
         if there:
             raise UnknownToPaperError(f"no independent formula stands here for {what}")
+
+
+def all_parameters(block: Block) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """The parameters of the linear and interior families that act, estimated or held at a value: (family, items)."""
+    found = {family: list(items) for family, items in block.settings.adjustment.additional_parameters}
+    for camera in block.cameras:
+        for name in camera.parameters:
+            family, _, item = name.partition(".")
+            found.setdefault(family, []).append(item)
+    return tuple((family, tuple(dict.fromkeys(items))) for family, items in found.items())
+
+
+def parameters_text(parameters: tuple[tuple[str, tuple[str, ...]], ...]) -> list[str]:
+    """Parameters, (family, items) pairs, in words: 'dmc.29', or the family alone where there are many."""
+    words = []
+    for family, items in parameters:
+        words += [f"{family}.{item}" for item in items] if len(items) <= MOST_NAMED else [family]
+    return words
 
 
 def _groups(block: Block) -> np.ndarray:
@@ -224,6 +232,10 @@ class _Entries:
             prior = Prior(0.0, fixed=True)
         sigma = np.inf if prior.sigma is None else prior.sigma
         return self._rows.setdefault((name, owner), (len(self._rows), prior.value, sigma, not prior.fixed))[0]
+
+    def is_removed(self, name: str, group: str) -> bool:
+        """Whether a selection took a parameter out of a group."""
+        return (name, group) in self._removed
 
     def sorted(self) -> tuple[Shared, np.ndarray]:
         """The entries, and the final place of every provisional number."""
@@ -263,19 +275,21 @@ _Linear = tuple[str, str, int]
 """Family, item and number of an entry."""
 
 
-def _linear_entries(
-    block: Block, group: str, groups: np.ndarray, cameras: np.ndarray, entries: _Entries
-) -> list[_Linear]:
-    """Entries of the linear families of a group: (family, item, number), families with a fitting camera only."""
-    models = {block.cameras[k].model for k in cameras[groups == group].tolist()}
+def _linear_entries(block: Block, camera_row: int, group: str, entries: _Entries) -> list[_Linear]:
+    """Entries of the linear families of a camera and group: (family, item, number)."""
+    camera, chosen = block.cameras[camera_row], dict(block.settings.adjustment.additional_parameters)
     found = []
-    for family, items in block.settings.adjustment.additional_parameters:
-        if family in LINEAR and LINEAR[family][1] in (None, *models):
-            found += [
-                (family, item, entries.add(f"{family}.{item}", ("group", group), Prior()))
-                for item in LINEAR[family][0]
-                if item in items
-            ]
+    for family, items in all_parameters(block):
+        if family not in LINEAR or not LINEAR[family].fits(camera):
+            continue
+        for item in items:
+            name = f"{family}.{item}"
+            stated = camera.parameters.get(name)
+            if item in chosen.get(family, ()) and not (stated is not None and stated.fixed):
+                found.append((family, item, entries.add(name, ("group", group), stated or Prior())))
+            elif stated is not None and not entries.is_removed(name, group):
+                held = Prior(stated.value, fixed=True)
+                found.append((family, item, entries.add(name, ("camera", camera.name), held)))
     return found
 
 
@@ -286,17 +300,14 @@ def _patterns(
     width = max((len(found) for found in linear), default=0)
     entries, values = np.full((len(setups), width), -1), np.zeros((len(xy), 2, width))
     for k, (camera_row, _) in enumerate(setups):
-        camera, own = block.cameras[camera_row], np.flatnonzero(setup == k)
+        own = np.flatnonzero(setup == k)
         entries[k, : len(linear[k])] = [number for _, _, number in linear[k]]
         for family in dict.fromkeys(family for family, _, _ in linear[k]):
-            known, model, formula = LINEAR[family]
-            if model not in (None, camera.model):
-                continue
-            all_items = formula(camera, xy[own, 0], xy[own, 1])
             columns = [c for c, (f, _, _) in enumerate(linear[k]) if f == family]
-            values[own[:, None, None], np.arange(2)[:, None], columns] = all_items[
-                :, :, [known.index(linear[k][c][1]) for c in columns]
-            ]
+            items = tuple(linear[k][c][1] for c in columns)
+            values[own[:, None, None], np.arange(2)[:, None], columns] = LINEAR[family].patterns(
+                block.cameras[camera_row], xy[own, 0], xy[own, 1], items
+            )
     return entries, values
 
 

@@ -13,6 +13,7 @@ from aerotri.crosscheck.paper_block import PaperBlock, UnknownToPaperError, pape
 from aerotri.crosscheck.paper_rays import angles_of
 from aerotri.crosscheck.paper_system import PaperSolution, solve_normal_equations
 from aerotri.crosscheck.paper_unknowns import KnownSolution, Layout, lay_out, rotations
+from aerotri.crosscheck.pattern_check import compare_patterns
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock, SharedParameters
 
@@ -21,6 +22,8 @@ QUESTION = "all unknowns with the forward model written from the papers alone, s
 FAR_OFF = 50.0
 """Residual in σ from which a ray keeps its measured position, as the adjustment has it."""
 ELEMENTS = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
+OWNERS = {"interior": "camera", "additional": "group", "gnss": "gnss"}
+"""What the entries of a kind of parameters belong to."""
 KINDS = {"interior": "interior orientation", "additional": "additional parameters", "gnss": "GNSS shifts and drifts"}
 
 
@@ -47,7 +50,7 @@ def check_with_paper(adjusted: AdjustedBlock, adjust: Callable[[Block], Adjusted
             _removed(adjusted.parameters),
         )
     except UnknownToPaperError as unknown:
-        return PeerCheck(PEER, QUESTION, "not available", str(unknown))
+        return PeerCheck(PEER, QUESTION, "not available", str(unknown), checks_parameters=True)
     layout, start = lay_out(paper, _known(adjusted, paper))
     solution = _solve(paper, layout, start)
     check = PeerCheck(
@@ -63,6 +66,8 @@ def check_with_paper(adjusted: AdjustedBlock, adjust: Callable[[Block], Adjusted
         vtpv=adjusted.outcome.vtpv,
         vtpv_peer=solution.vtpv,
         differences=_differences(adjusted, paper, layout, solution.x),
+        patterns=compare_patterns(adjusted, paper, adjusted_entries(adjusted, paper)),
+        checks_parameters=True,
         notes=(*notes, *_notes(adjusted, solution)),
     )
     return judge(check, _counts_differ(adjusted, check)) if solution.converged else check
@@ -146,13 +151,27 @@ def _differences(adjusted: AdjustedBlock, paper: PaperBlock, layout: Layout, x: 
     return tuple(d for d in found if d is not None)
 
 
-def _shared_differences(adjusted: AdjustedBlock, paper: PaperBlock, values: np.ndarray) -> list[Difference | None]:
+def _entries(adjusted: AdjustedBlock, paper: PaperBlock) -> np.ndarray:
+    """(s,) the peer's entry of every shared parameter of ours, −1 where it has none."""
     p, place = adjusted.parameters, paper.shared.place()
-    owner_kind = {"interior": "camera", "additional": "group", "gnss": "gnss"}
+    keys = zip(p.names, p.groups, p.kinds, strict=True)
+    found = [place.get((str(name), (OWNERS.get(str(kind), ""), str(group))), -1) for name, group, kind in keys]
+    return np.array(found, dtype=np.int64)
+
+
+def adjusted_entries(adjusted: AdjustedBlock, paper: PaperBlock) -> np.ndarray:
+    """Our value of every shared entry of the peer: as adjusted, or as it is held."""
+    values, entry = paper.shared.start.copy(), _entries(adjusted, paper)
+    ours = np.flatnonzero((entry >= 0) & (adjusted.parameters.status != "removed"))
+    values[entry[ours]] = adjusted.parameters.value[ours]
+    return values
+
+
+def _shared_differences(adjusted: AdjustedBlock, paper: PaperBlock, values: np.ndarray) -> list[Difference | None]:
+    p, entry = adjusted.parameters, _entries(adjusted, paper)
+    known = (entry >= 0) & paper.shared.free[np.maximum(entry, 0)] if len(paper.shared.free) else entry >= 0
     peer = np.full(len(p), np.nan)
-    for k, (name, group, kind) in enumerate(zip(p.names, p.groups, p.kinds, strict=True)):
-        entry = place.get((str(name), (owner_kind.get(str(kind), ""), str(group))))
-        peer[k] = np.nan if entry is None or not paper.shared.free[entry] else values[entry]
+    peer[known] = values[entry[known]]
     labels = np.array([f"{name} ({group})" for name, group in zip(p.names, p.groups, strict=True)], dtype=object)
     return [
         difference(title, (peer - p.value)[own, None], p.sigma[own, None], labels[own], ("",))

@@ -6,7 +6,9 @@ from collections.abc import Callable
 
 from aerotri.conventions import InputError
 from aerotri.crosscheck.comparison import CrosscheckResult, PeerCheck
+from aerotri.crosscheck.paper_block import all_parameters, parameters_text
 from aerotri.crosscheck.paper_check import check_with_paper
+from aerotri.crosscheck.paper_families import unknown_parameters
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock
 
@@ -27,8 +29,7 @@ def crosscheck(
     Raises
     ------
     InputError
-        For a block with rigid rigs, a rolling shutter or given values of linear parameters, which the peers do not
-        know.
+        For a block with rigid rigs or a rolling shutter, which the peers do not know.
     """
     if adjusted.rigs:
         raise InputError(
@@ -41,17 +42,22 @@ def crosscheck(
             "the cross-check knows no rolling shutter",
             f"cross-check an adjustment without [camera.{camera}.rolling_shutter]",
         )
-    for camera in adjusted.block.cameras:
-        if camera.parameters:
-            raise InputError(
-                "the cross-check knows no given values of additional parameters",
-                f"cross-check an adjustment without [camera.{camera.name}.parameters]",
-            )
     tell: Callable[[str], None] = report or (lambda text: None)
     tell("adjusting through pycolmap")
     colmap = _colmap(adjusted, adjust)
     tell("adjusting by the independent model")
-    return CrosscheckResult(adjusted.block.name, (colmap, check_with_paper(adjusted, adjust)))
+    paper = check_with_paper(adjusted, adjust)
+    unknown = parameters_text(unknown_parameters(all_parameters(adjusted.block)))
+    return CrosscheckResult(adjusted.block.name, (colmap, paper), _parameters(adjusted), tuple(unknown))
+
+
+def _parameters(adjusted: AdjustedBlock) -> tuple[str, ...]:
+    """What the block has for parameters, estimated or held at a value: linear families and others in words."""
+    families = {family: () for family, _ in all_parameters(adjusted.block)}
+    families |= {family: () for camera in adjusted.block.cameras for family in ("brown", "lens")
+                 if any(prior.value for prior in getattr(camera, family).values())}  # fmt: skip
+    names = (str(name) for name in adjusted.parameters.names)
+    return tuple(dict.fromkeys([*families, *(name.partition(".")[0] for name in names)]))
 
 
 def _colmap(adjusted: AdjustedBlock, adjust: Callable[[Block], AdjustedBlock]) -> PeerCheck:

@@ -193,13 +193,20 @@ CROSSCHECK_JSON = (
         "verdict",
         "text",
         "Whether the other programs find the same.",
-        values={"agrees": "within the limits", "differs": "beyond them", "not checked": "none could adjust the block"},
+        values={
+            "agrees": "within the limits",
+            "differs": "beyond them",
+            "parameters not checked": "within the limits, but no program has the parameters of the block",
+            "not checked": "none could adjust the block",
+        },
     ),
+    Item("parameters_not_checked[]", "text", "Parameters that no program has checked, such as collocation."),
     Item("message", "text", "The verdict in a line."),
     Item("limits", "object", "What differences may be."),
     Item("limits.sigma", "number", "Of an unknown, in its standard deviations."),
     Item("limits.vtpv", "number", "Of vᵀPv, of itself."),
     Item("limits.covariance", "number", "Of standard deviations, of themselves."),
+    Item("limits.patterns", "number", "Of the pattern of a parameter, of its largest value."),
     Item("checks[]", "object", "One entry a program."),
     Item(
         "checks[].peer",
@@ -230,6 +237,10 @@ CROSSCHECK_JSON = (
     Item("checks[].covariance.sigma", "number?", "Largest difference of a standard deviation, of itself."),
     Item("checks[].covariance.correlation", "number?", "Largest difference of a correlation."),
     Item("checks[].covariance.worst", "text", "The photograph that differs most."),
+    Item("checks[].patterns", "object?", "Formulas compared directly; null where they are not."),
+    Item("checks[].patterns.count", "whole", "Parameters compared, and the collinearity equations."),
+    Item("checks[].patterns.max", "number?", "Largest difference of a pattern, of its largest value."),
+    Item("checks[].patterns.worst", "text", "The parameter that differs most."),
     Item("checks[].notes[]", "text", "What to bear in mind."),
 )
 

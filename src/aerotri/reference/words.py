@@ -154,6 +154,12 @@ WORDS = (
     Word("failed", "verdict of --check-free", "The tie points alone give no block.", "Measure more tie points."),
     Word("agrees", "verdict of crosscheck", "The other program finds the same result."),
     Word("differs", "verdict of crosscheck", "The other program finds another result.", "Please report it."),
+    Word(
+        "parameters not checked",
+        "verdict of crosscheck",
+        "Points and orientation agree, but no other program has the block's parameters; they are named.",
+        "Cross-check with a set that the independent model has, such as bluh or brown.",
+    ),
     Word("not checked", "verdict of crosscheck", "No other program could adjust the block; the reasons are given."),
     *(Word(name, "reason in images.csv and points.csv", *said) for name, said in REASONS.items()),
 )

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from aerotri.crosscheck.comparison import COVARIANCE_LIMIT, LIMIT, CrosscheckResult, PeerCheck
+from aerotri.crosscheck.comparison import COVARIANCE_LIMIT, LIMIT, PATTERN_LIMIT, CrosscheckResult, PeerCheck
 from aerotri.report.plots.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, plain, styled
 from aerotri.report.tables.adjustment import Column, Table
 
@@ -39,6 +39,10 @@ def crosscheck_table(result: CrosscheckResult) -> Table:
             c = check.covariance
             for what, value in (("σ of the orientation, relative", c.sigma), ("its correlations", c.correlation)):
                 rows.append((check.peer, what, c.photographs, value, None, c.worst, _outcome(value, COVARIANCE_LIMIT)))
+        if check.patterns is not None:
+            p = check.patterns
+            outcome = _outcome(p.max, PATTERN_LIMIT)
+            rows.append((check.peer, "patterns, relative", len(p.names), p.max, None, p.worst, outcome))
         if check.solver:
             rows.append((check.peer, "vᵀPv, relative", None, abs(check.vtpv_difference), None, "", check.status))
         else:
