@@ -109,14 +109,14 @@ def rtklib(
     return "\n".join([*head, *rows]) + "\n"
 
 
-def grafnav(seconds: np.ndarray, minutes=False, utc=False, quality=None):
-    """A trajectory as GrafNav writes it."""
+def grafnav(seconds: np.ndarray, minutes=False, utc=False, quality=None, lengths=1.0, more=""):
+    """A trajectory as GrafNav writes it; `lengths`: metres in the unit of heights and σ; `more`: names of columns."""
     clock = "UTC" if utc else "GPS"
     unit = "(D M S)" if minutes else "(deg)"
     head = [
         "", "Project:     field", "Program:     GrafNav Version 8.90", "Datum:       WGS84", "UTC Offset:  18 s", "",
         f"   {clock}Date {clock}Time {clock}Time          Latitude         Longitude        H-Ell      SDHoriz "
-        "    SDHeight Q",
+        f"    SDHeight Q{more}",
         f"     (YMD)   (HMS)   (sec) {unit:>17} {unit:>17}          (m)          (m)          (m)  ",
     ]  # fmt: skip
     quality = np.ones(len(seconds), int) if quality is None else quality
@@ -126,9 +126,8 @@ def grafnav(seconds: np.ndarray, minutes=False, utc=False, quality=None):
         spot = [in_minutes(v) if minutes else f"{v:.10f}" for v in (place[1], place[0])]
         plan = np.sqrt(2.0) * SIGMA[0]
         second = START + t - (LEAP if utc else 0.0)
-        rows.append(
-            f"{moment} {second:10.3f} {spot[0]:>17} {spot[1]:>17} {place[2]:12.4f} {plan:12.4f} {SIGMA[2]:12.4f} {q}"
-        )
+        sizes = " ".join(f"{size / lengths:12.4f}" for size in (place[2], plan, SIGMA[2]))
+        rows.append(f"{moment} {second:10.3f} {spot[0]:>17} {spot[1]:>17} {sizes} {q}" + " 0.1" * len(more.split()))
     return "\n".join([*head, *rows]) + "\n"
 
 

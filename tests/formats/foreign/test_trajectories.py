@@ -55,6 +55,32 @@ def test_trajectories_of_grafnav(name, tmp_path):
     check(read_grafnav(path), (SIGMA[0], SIGMA[0], SIGMA[2]))
 
 
+FEET = {"ft": 0.3048, "usft": 1200.0 / 3937.0}
+
+
+@pytest.mark.parametrize("unit", FEET)
+def test_heights_and_sigma_in_feet(unit, tmp_path):
+    """Of GrafNav's columns each has its unit: the same flight in feet is the same flight."""
+    # units end where their columns end
+    text = grafnav(SECONDS, lengths=FEET[unit]).replace(" " * (len(unit) - 1) + "(m)", f"({unit})")
+    found = read_grafnav(written(tmp_path, text))
+    check(found, (SIGMA[0], SIGMA[0], SIGMA[2]))
+    assert f"flight.pos: heights in {unit}, brought to metres" in found.messages
+    with pytest.raises(InputError, match="counts in 'yd'"):
+        read_grafnav(written(tmp_path, text.replace(f"({unit})", "(yd)")))
+
+
+def test_columns_of_inertial_explorer(tmp_path):
+    """A name that is cut off, a datum with an addition, and columns that are not used but named."""
+    text = grafnav(SECONDS, more="  SD-VE Roll Pitch Heading").replace("SDHeight", " SDHeigh")
+    path = written(tmp_path, text.replace("WGS84", "ETRS89, (processing datum)"))
+    found = read_grafnav(path)
+    check(found, (SIGMA[0], SIGMA[0], SIGMA[2]))
+    assert found.datum == "ETRS89"
+    assert "flight.pos: not used: sd-ve" in found.messages
+    assert any("not used: roll, pitch, heading; positions may be those of the IMU" in text for text in found.messages)
+
+
 def test_covariances_have_their_sign(tmp_path):
     """σ east, north, up of earth-centred σ with correlations; a lost sign would give others."""
     sigmas = (0.05, 0.02, 0.01)

@@ -1,8 +1,9 @@
 """Trajectories of NovAtel's GrafNav and Inertial Explorer: a text of aligned columns whose names stand above them.
 
 Two lines name the columns and, below, their units in brackets: UTC or GPS times as seconds (of the week), weeks, date
-and time of day; latitude and longitude in degrees, or in degrees, minutes and seconds; the height; σ; a quality from 1
-(best) to 6. What is used of the times are GPS seconds where the file has them, else UTC with the leap seconds.
+and time of day; latitude and longitude in degrees, or in degrees, minutes and seconds; the height and σ, in metres or
+feet; a quality from 1 (best) to 6. What is used of the times are GPS seconds where the file has them, else UTC with the
+leap seconds.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from aerotri.formats.assembly.timed import DIFFERENTIAL, FIXED, FLOAT, SINGLE, T
 from aerotri.formats.foreign.gnss_time import WEEK_S, calendar_seconds, in_week_of, leap_seconds
 from aerotri.formats.text.csv_text import read_bytes
 from aerotri.formats.text.encodings import decoded
+from aerotri.formats.text.notes import left_behind, taken
 from aerotri.formats.text.text_lines import TextFile, first_lines, is_number
 
 QUALITY = {1: FIXED, 2: FLOAT, 3: FLOAT, 4: DIFFERENTIAL, 5: DIFFERENTIAL, 6: SINGLE}
@@ -31,7 +33,21 @@ TIMES = ("gpstime", "utctime", "localtime", "gpsseconds", "utcseconds")
 OF_DAY = ("hms", "h:m:s", "hh:mm:ss")
 OF_WEEK = ("sec", "s", "secs", "seconds", "sow")
 """Units of times."""
-DATUM = re.compile(r"datum\s*:\s*(.+)", re.IGNORECASE)
+METRES = {"": 1.0} | {
+    name: factor
+    for factor, names in (
+        (1.0, ("m", "metre", "metres", "meter", "meters")),
+        (0.3048, ("ft", "feet", "ift")),
+        (1200.0 / 3937.0, ("usft", "ftus", "us-ft", "us ft", "sft")),
+    )
+    for name in names
+}
+"""Metres by the unit of a height or σ; without one they count in metres."""
+HEIGHT_SIGMAS = ("sdheight", "sdheigh")
+"""σ of the height, whose name GrafNav cuts off where its column is narrow."""
+ATTITUDE = ("roll", "pitch", "heading")
+DATUM = re.compile(r"datum\s*:\s*([^,]+)", re.IGNORECASE)
+"""Of ``Datum: ETRS89, (processing datum)`` the part before the comma."""
 OFFSET = re.compile(r"utc\s+offset\s*:\s*(-?\d+(?:\.\d+)?)", re.IGNORECASE)
 
 
@@ -86,8 +102,25 @@ def read_grafnav(path: FilePath) -> Trajectory:
         heights="ellipsoidal" if height in HEIGHTS[:2] else "sea level",
         datum=datum,
         week_known=week_known,
-        messages=file.notes,
+        messages=(*file.notes, *_about(reader, height)),
     )
+
+
+def _about(reader: _Rows, height: str) -> tuple[str, ...]:
+    """On units and on columns that are not used."""
+    said: list[str] = []
+    column = reader.column(height)
+    if column is not None and METRES.get(column.unit) != 1.0:
+        said.append(taken(f"{reader.file.path.name}: heights in {column.unit}, brought to metres"))
+    used = {*_sigma_columns(reader), *(("sdhoriz",) if reader.has("sdeast") and reader.has("sdnorth") else ())}
+    unused = [column.name for column in reader.columns if column.name.startswith("sd") and column.name not in used]
+    if unused:
+        said.append(left_behind(f"{reader.file.path.name}: not used: {', '.join(unused)[:120]}"))
+    angles = [column.name for column in reader.columns if column.name in ATTITUDE]
+    if angles:
+        words = "positions may be those of the IMU instead of the antenna: check which were exported"
+        said.append(left_behind(f"{reader.file.path.name}: not used: {', '.join(angles)}; {words}"))
+    return tuple(said)
 
 
 def _split(line: str) -> list[str]:
@@ -156,6 +189,21 @@ class _Rows:
         assert column is not None
         return self.file.values(self.texts(column), self.rows, name)
 
+    def metres(self, name: str) -> np.ndarray:
+        """(n,) m of a column of lengths that is there.
+
+        Raises
+        ------
+        InputError
+            When its unit is not known.
+        """
+        column = self.column(name)
+        assert column is not None
+        if column.unit not in METRES:
+            message = f"the column {name} counts in '{column.unit[:20]}', which is no unit of lengths that is known"
+            raise InputError(message, "export heights and standard deviations in metres", self.file.path)
+        return self.numbers(name) * METRES[column.unit]
+
     def degrees(self, name: str) -> np.ndarray:
         column = self.column(name)
         assert column is not None
@@ -191,7 +239,7 @@ def _body(file: TextFile, head: int) -> _Rows:
 
 def _places(reader: _Rows, height: str) -> np.ndarray:
     """(n, 3) longitude, latitude, and the height of a column."""
-    place = np.column_stack([reader.degrees("longitude"), reader.degrees("latitude"), reader.numbers(height)])
+    place = np.column_stack([reader.degrees("longitude"), reader.degrees("latitude"), reader.metres(height)])
     odd = np.flatnonzero((np.abs(place[:, 0]) > 360.0) | (np.abs(place[:, 1]) > 90.0))
     if len(odd):
         raise reader.file.error(reader.rows[odd[0]], "the latitude or longitude is none", "check the columns")
@@ -271,13 +319,18 @@ def _of_day(file: TextFile, row: int, text: str) -> float:
     return 3600.0 * hour + 60.0 * minute + second
 
 
-def _sigmas(reader: _Rows) -> np.ndarray:
-    """(n, 3) σ east, north, up; that of the plan is taken as √2 times that of a coordinate."""
-    found = np.full((len(reader.rows), 3), np.nan)
+def _sigma_columns(reader: _Rows) -> tuple[str, str, str]:
+    """Names of the columns of σ east, north, up; '' where there is none."""
+    height = next((name for name in HEIGHT_SIGMAS if reader.has(name)), "")
     if reader.has("sdeast") and reader.has("sdnorth"):
-        found[:, 0], found[:, 1] = reader.numbers("sdeast"), reader.numbers("sdnorth")
-    elif reader.has("sdhoriz"):
-        found[:, 0] = found[:, 1] = reader.numbers("sdhoriz") / np.sqrt(2.0)
-    if reader.has("sdheight"):
-        found[:, 2] = reader.numbers("sdheight")
+        return "sdeast", "sdnorth", height
+    return ("sdhoriz", "sdhoriz", height) if reader.has("sdhoriz") else ("", "", height)
+
+
+def _sigmas(reader: _Rows) -> np.ndarray:
+    """(n, 3) m σ east, north, up; that of the plan is taken as √2 times that of a coordinate."""
+    found = np.full((len(reader.rows), 3), np.nan)
+    for k, name in enumerate(_sigma_columns(reader)):
+        if name:
+            found[:, k] = reader.metres(name) / (np.sqrt(2.0) if name == "sdhoriz" else 1.0)
     return np.where(found > 0.0, found, np.nan)
