@@ -17,6 +17,7 @@ from aerotri.formats.assembly.placing import in_axes_at, in_local_frame
 from aerotri.formats.block import writer as block_writer
 from aerotri.formats.block.folder import read_block, write_block
 from aerotri.formats.foreign import bundler, colmap, opensfm, patb
+from aerotri.formats.foreign.alicevision import is_alicevision, read_alicevision
 from aerotri.formats.foreign.bal import is_bal, read_bal, write_bal
 from aerotri.formats.foreign.bingo import write_bingo
 from aerotri.formats.foreign.blocks_exchange import is_blocks_exchange, read_blocks_exchange
@@ -37,7 +38,7 @@ from aerotri.formats.foreign.metashape_project import read_metashape_project
 from aerotri.formats.foreign.micmac import is_micmac, read_micmac
 from aerotri.formats.foreign.nvm import is_nvm, read_nvm
 from aerotri.formats.foreign.odm import write_odm_gcp
-from aerotri.formats.foreign.openmvg import is_alicevision, is_openmvg, read_alicevision, read_openmvg
+from aerotri.formats.foreign.openmvg import is_openmvg, read_openmvg
 from aerotri.formats.foreign.opensfm import is_opensfm, read_opensfm, write_opensfm
 from aerotri.formats.foreign.opensfm_in_place import origin_of, update_opensfm
 from aerotri.formats.foreign.opf import read_opf

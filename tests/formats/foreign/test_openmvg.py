@@ -11,7 +11,8 @@ import pytest
 import aerotri
 from aerotri.conventions import InputError
 from aerotri.formats.convert import detect_format
-from aerotri.formats.foreign.openmvg import read_alicevision, read_openmvg
+from aerotri.formats.foreign.alicevision import read_alicevision
+from aerotri.formats.foreign.openmvg import read_openmvg
 from aerotri.functional_model.rotation import rotation_from_angles
 from formats.foreign.metashape_sample import ANGLES, CENTRES, Sample
 
@@ -26,10 +27,10 @@ def pixels(k: int, kind: str) -> np.ndarray:
     """(n, 2) of the points in a photograph."""
     x, y, z = CAMERA_FROM_WORLD[k] @ (POINTS - CENTRES[k]).T
     u, v = x / z, y / z
-    if kind == "fisheye":
-        r = np.hypot(u, v)
+    if kind in ("fisheye", "equidistant"):
+        r, lens = np.hypot(u, v), F if kind == "fisheye" else ()
         theta = np.arctan(r)
-        scale = theta * (1 + sum(f * theta ** (2 * i + 2) for i, f in enumerate(F))) / r
+        scale = theta * (1 + sum(f * theta ** (2 * i + 2) for i, f in enumerate(lens))) / r
         return np.column_stack([FOCAL * scale * u + CENTRE[0], FOCAL * scale * v + CENTRE[1]])
     t1, t2 = T if kind == "brown" else (0.0, 0.0)
     r2 = u * u + v * v
@@ -74,7 +75,7 @@ def openmvg(kind: str = "brown", control: int = 4) -> dict:
     }  # fmt: skip
 
 
-def alicevision(old: bool = False) -> dict:
+def alicevision(old: bool = False, kind: str = "radial", control: int = 0) -> dict:
     """As AliceVision writes it, numbers as texts and matrices column by column."""
     camera = {"intrinsicId": "77", "width": str(SIZE[0]), "height": str(SIZE[1]), "type": "pinhole",
               "distortionType": "radialk3", "distortionParams": [str(k) for k in K], "locked": "false"}  # fmt: skip
@@ -85,6 +86,14 @@ def alicevision(old: bool = False) -> dict:
         offset = [str(c - side / 2) for c, side in zip(CENTRE, SIZE, strict=True)]
         camera |= {"sensorWidth": "13.2", "sensorHeight": "9.9", "focalLength": repr(FOCAL * 13.2 / SIZE[0]),
                    "pixelRatio": "1", "principalPoint": offset}  # fmt: skip
+    if kind == "equidistant":
+        camera |= {"type": kind, "distortionType": "none", "distortionParams": "",
+                   "fisheyeCircleCenterX": "0", "fisheyeCircleCenterY": "0", "fisheyeCircleRadius": "1500"}  # fmt: skip
+    points = [
+        {"landmarkId": str(j), "descType": "sift", "X": [repr(v) for v in POINTS[j].tolist()],
+         "observations": [{"observationId": str(100 + k), "featureId": "0", "x": [repr(x), repr(y)]}
+                          for k, x, y in seen]} for j, seen in enumerate(observations(kind))
+    ]  # fmt: skip
     return {
         "version": ["1", "0", "0"] if old else ["1", "2", "8"],
         "views": [{"viewId": str(100 + k), "poseId": str(100 + k), "intrinsicId": "77", "path": f"/photos/DJI_{k}.JPG"}
@@ -93,10 +102,7 @@ def alicevision(old: bool = False) -> dict:
         "poses": [{"poseId": str(100 + k), "pose": {"transform": {
             "rotation": [repr(v) for v in CAMERA_FROM_WORLD[k].T.ravel().tolist()],
             "center": [repr(v) for v in CENTRES[k].tolist()]}, "locked": "0"}} for k in range(6)],
-        "structure": [{"landmarkId": str(j), "descType": "sift", "X": [repr(v) for v in POINTS[j].tolist()],
-                       "observations": [{"observationId": str(100 + k), "featureId": "0", "x": [repr(x), repr(y)]}
-                                        for k, x, y in seen]}
-                      for j, seen in enumerate(observations("radial"))],
+        "structure": points[control:], "controlPoints": points[:control],
     }  # fmt: skip
 
 
@@ -123,12 +129,66 @@ def test_openmvg(tmp_path, kind):
     assert block.cameras[0].projection == ("fisheye" if kind == "fisheye" else "perspective")
 
 
-@pytest.mark.parametrize("old", [True, False])
-def test_alicevision(tmp_path, old):
+def of_version_1_2_1() -> dict:
+    """Focal lengths in pixels, principal points from the image centre."""
+    content = alicevision() | {"version": ["1", "2", "1"]}
+    camera = content["intrinsics"][0]
+    camera["pxFocalLength"] = [camera.pop("focalLength") and repr(FOCAL)] * 2
+    return content
+
+
+def half_circle() -> dict:
+    """An image circle of half the radius, in a sensor whose focal length is twice as long."""
+    content = alicevision(kind="equidistant")
+    content["intrinsics"][0] |= {"fisheyeCircleRadius": "750", "focalLength": repr(2 * FOCAL * 13.2 / SIZE[0])}
+    return content
+
+
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [
+        (alicevision(True), "radial"),
+        (alicevision(), "radial"),
+        (of_version_1_2_1(), "radial"),
+        (alicevision(kind="equidistant"), "equidistant"),
+        (half_circle(), "equidistant"),
+    ],
+    ids=["1.0.0", "1.2.8", "1.2.1", "equidistant", "half circle"],
+)
+def test_alicevision(tmp_path, content, kind):
     path = tmp_path / "sfm.abc.sfm"
-    path.write_text(json.dumps(alicevision(old)))
+    path.write_text(json.dumps(content))
     assert detect_format(path) == "alicevision"
-    check(aerotri.read(path, pixel_um=4.0), "radial")
+    reading = aerotri.read(path, pixel_um=4.0)
+    check(reading, kind)
+    assert reading.block.cameras[0].projection == ("fisheye" if kind == "equidistant" else "perspective")
+
+
+def test_control_points_of_alicevision(tmp_path):
+    path = tmp_path / "x.sfm"
+    path.write_text(json.dumps(alicevision(control=4) | {"surveyPoints": [{"X": ["1"]}]}))
+    reading = read_alicevision(path)
+    np.testing.assert_allclose(reading.block.control.xyz, POINTS[:4])
+    assert "not used: surveyPoints" in reading.messages
+
+
+@pytest.mark.parametrize("program", ["openmvg", "alicevision"])
+def test_photographs_without_camera_and_positions(tmp_path, program):
+    """A photograph without camera is left out, and does not stop the others."""
+    content = openmvg() if program == "openmvg" else alicevision()
+    if program == "openmvg":
+        views = [view["value"]["ptr_wrapper"]["data"] for view in content["views"]]
+        views[2]["id_intrinsic"] = 4294967295
+        views[1] |= {"use_pose_center_prior": True, "center_weight": [1.0] * 3, "center": [1.0, 2.0, 3.0]}
+    else:
+        del content["views"][2]["intrinsicId"]
+    path = tmp_path / "x.json"
+    path.write_text(json.dumps(content))
+    reading = aerotri.read(path)
+    assert reading.block.images.names.tolist() == [f"DJI_{k}.JPG" for k in range(6) if k != 2]
+    assert "left out: 1 photograph without a camera" in reading.messages
+    said = any(text.startswith("not used: 1 position of photographs") for text in reading.messages)
+    assert said == (program == "openmvg")
 
 
 def test_views_without_pose_and_rigs(tmp_path):
@@ -179,6 +239,9 @@ def test_what_openmvg_is_refused(tmp_path, change, says):
         ({"sensorWidth": "-1"}, "no size of the sensor"),
         ({"focalLength": "1e300"}, "is not possible"),
         ({"width": "4000.5"}, "no format"),
+        ({"type": "equirectangular"}, "type equirectangular"),
+        ({"type": "equidistant"}, "equidistant camera with distortion"),
+        ({"undistortionType": "radialk3", "undistortionParams": ["0.1", "0", "0"]}, "undistortion of type radialk3"),
     ],
 )
 def test_what_alicevision_is_refused(tmp_path, change, says):

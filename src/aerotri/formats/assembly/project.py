@@ -34,6 +34,7 @@ from aerotri.formats.assembly.parts import (
 from aerotri.formats.assembly.reprojection import FEWEST, control_at_start, residuals_at_start, sample_of_points
 from aerotri.formats.assembly.rigs_by_name import names_told, with_rig
 from aerotri.formats.block.folder import read_block
+from aerotri.formats.foreign.alicevision import read_alicevision
 from aerotri.formats.foreign.blocks_exchange import read_blocks_exchange
 from aerotri.formats.foreign.bundler import read_bundler
 from aerotri.formats.foreign.colmap import read_colmap
@@ -42,7 +43,7 @@ from aerotri.formats.foreign.list_header import has_attitudes
 from aerotri.formats.foreign.metashape_project import read_metashape_project
 from aerotri.formats.foreign.micmac import read_micmac
 from aerotri.formats.foreign.nvm import read_nvm
-from aerotri.formats.foreign.openmvg import read_alicevision, read_openmvg
+from aerotri.formats.foreign.openmvg import read_openmvg
 from aerotri.formats.foreign.opensfm import read_opensfm
 from aerotri.formats.foreign.opensfm_gcp import NAME as OPENSFM_GCP
 from aerotri.formats.foreign.opf import read_opf

@@ -1,10 +1,8 @@
-"""sfm_data of OpenMVG and of AliceVision (Meshroom), in JSON, as a block.
+"""sfm_data of OpenMVG, in JSON, as a block; what it has in common with that of AliceVision.
 
-[L] OpenMVG's and AliceVision's sources. Rotations lead from the world to x right, y down, z forwards; centre is the
-projection centre. OpenMVG writes rotations row by row, AliceVision column by column, and its numbers as texts. Lenses
-are OpenCV's: disto_k1, disto_k3, disto_t2 (k1, k2, k3, p1, p2) and fisheye (k1 to k4). Since AliceVision writes focal
-lengths in millimetres (focalLength, sensorWidth), principal points count from the image centre; pixelRatio is then the
-focal length along y by that along x, since version 1.2.5. Coordinates are local.
+[L] OpenMVG's sources. Rotations lead from the world to x right, y down, z forwards and are written row by row; centre
+is the projection centre. Lenses are OpenCV's: disto_k1, disto_k3, disto_t2 (k1, k2, k3, p1, p2) and fisheye (k1 to k4).
+Coordinates are local.
 """
 
 from __future__ import annotations
@@ -38,23 +36,24 @@ OPENMVG_LENS: dict[str, tuple[str, ...]] = {
     "fisheye": ("k1", "k2", "k3", "k4"),
 }  # fmt: skip
 """Parameters by the key that holds them."""
-ALICEVISION_LENS: dict[str, tuple[str, ...]] = {
-    "none": (), "pinhole": (), "radial1": ("k1",), "radialk1": ("k1",), "radial3": ("k1", "k2", "k3"),
-    "radialk3": ("k1", "k2", "k3"), "brown": ("k1", "k2", "k3", "p1", "p2"), "fisheye4": ("k1", "k2", "k3", "k4"),
-}  # fmt: skip
-NO_RIG = ("", "4294967295", "-1")
-RATIO_SINCE = (1, 2, 5)
-"""Version since which pixelRatio is what its name says."""
+UNDEFINED = ("", "4294967295", "-1")
+"""Identifiers of nothing: no camera, no rig."""
+SECTIONS = (
+    "sfm_data_version", "root_path", "views", "intrinsics", "extrinsics", "structure", "control_points",
+)  # fmt: skip
+"""What is used of a file, or is of no use for an adjustment."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Scene:
+class Scene:
     """What both programs hold.
 
     Parameters
     ----------
-    views : file, key of the camera and pose by the key of a view; the pose is rotation and centre, None where unknown.
+    views : file, key of the camera ('' for none) and pose by the key of a view; the pose is rotation and centre, None
+        where unknown.
     cameras : by key. points : name, coordinates and observations (view, x, y). control : the same, of control points.
+    messages : what the user should know.
     """
 
     views: dict[str, tuple[str, str, tuple[np.ndarray, np.ndarray] | None]]
@@ -67,12 +66,6 @@ class _Scene:
 def is_openmvg(path: Path) -> bool:
     """Whether a JSON file is an sfm_data of OpenMVG."""
     return '"sfm_data_version"' in json_head(path, ENDINGS)
-
-
-def is_alicevision(path: Path) -> bool:
-    """Whether a JSON file is an sfm_data of AliceVision."""
-    head = json_head(path, ENDINGS)
-    return '"viewId"' in head and '"intrinsicId"' in head and '"nodesVersions"' not in head
 
 
 def read_openmvg(path: FilePath, pixel_um: float = 1.0) -> Reading:
@@ -88,20 +81,14 @@ def read_openmvg(path: FilePath, pixel_um: float = 1.0) -> Reading:
         When it is damaged, or a camera cannot be expressed.
     """
     path = Path(path)
-    return _reading(_openmvg_scene(_root(path)), path, pixel_um)
+    return reading_of(_openmvg_scene(root_of(path)), path, pixel_um)
 
 
-def read_alicevision(path: FilePath, pixel_um: float = 1.0) -> Reading:
-    """The scene of an sfm_data of AliceVision; see `read_openmvg`."""
-    path = Path(path)
-    return _reading(_alicevision_scene(_root(path)), path, pixel_um)
-
-
-def _root(path: Path) -> Node:
+def root_of(path: Path) -> Node:
     return Node(read_foreign_json(path, REMEDY), "the file", path)
 
 
-def _list(node: Node) -> list[Node]:
+def list_of(node: Node) -> list[Node]:
     if node.value == "":
         # an empty list of boost
         return []
@@ -110,7 +97,7 @@ def _list(node: Node) -> list[Node]:
     return [Node(value, f"{node.where}[{k}]"[:120], node.path) for k, value in enumerate(node.value)]
 
 
-def _number(node: Node) -> float:
+def number_of(node: Node) -> float:
     """A number, written as one or as a text."""
     if isinstance(node.value, str) and is_number(node.value):
         value = float(node.value)
@@ -120,51 +107,64 @@ def _number(node: Node) -> float:
     return node.number()
 
 
-def _numbers(node: Node, count: int | None = None) -> list[float]:
-    values = [_number(entry) for entry in _list(node)]
+def numbers_of(node: Node, count: int | None = None) -> list[float]:
+    values = [number_of(entry) for entry in list_of(node)]
     if count is not None and len(values) != count:
         raise node.error(f"is no list of {count} numbers", REMEDY)
     return values
 
 
-def _key(node: Node) -> str:
+def key_of(node: Node) -> str:
     """An identifier, written as a number or as a text."""
     if isinstance(node.value, bool) or not isinstance(node.value, int | str):
         raise node.error("is no identifier", REMEDY)
     return str(node.value)
 
 
-def _of(table: Node, section: str) -> list[Node]:
-    return _list(table.get(section)) if table.has(section) else []
+def section_of(table: Node, section: str) -> list[Node]:
+    return list_of(table.get(section)) if table.has(section) else []
 
 
-def _openmvg_scene(root: Node) -> _Scene:
+def _openmvg_scene(root: Node) -> Scene:
     poses = {}
-    for entry in _of(root, "extrinsics"):
+    for entry in section_of(root, "extrinsics"):
         value = entry.get("value")
-        rows = [number for row in _list(value.get("rotation")) for number in _numbers(row, 3)]
-        poses[_key(entry.get("key"))] = _pose(value, np.array(rows), value.get("center"))
+        rows = [number for row in list_of(value.get("rotation")) for number in numbers_of(row, 3)]
+        poses[key_of(entry.get("key"))] = pose_of(value, np.array(rows), value.get("center"))
     views = {}
-    for entry in _of(root, "views"):
+    positions = 0
+    for entry in section_of(root, "views"):
         data = entry.get("value").get("ptr_wrapper").get("data")
         data = data.get("value0") if data.has("value0") else data
         name = "/".join(data.get(key).value for key in ("local_path", "filename") if _is_text(data, key))
-        pose = poses.get(_key(data.get("id_pose")))
-        views[_key(entry.get("key"))] = name, _key(data.get("id_intrinsic")), pose
-    cameras = {_key(one.get("key")): _openmvg_camera(one.get("value")) for one in _of(root, "intrinsics")}
-    structure = [_openmvg_point(one) for one in _of(root, "structure")]
-    return _Scene(views, cameras, structure, [_openmvg_point(one) for one in _of(root, "control_points")])
+        pose = poses.get(key_of(data.get("id_pose")))
+        positions += data.has("center")
+        views[key_of(entry.get("key"))] = name, key_of(data.get("id_intrinsic")), pose
+    cameras = {key_of(one.get("key")): _openmvg_camera(one.get("value")) for one in section_of(root, "intrinsics")}
+    structure = [_openmvg_point(one) for one in section_of(root, "structure")]
+    said = not_used(root, SECTIONS)
+    if positions:
+        words = f"{counted(positions, 'position')} of photographs, observed before the adjustment"
+        said.append(left_behind(f"not used: {words}; give them with --positions"))
+    control = [_openmvg_point(one) for one in section_of(root, "control_points")]
+    return Scene(views, cameras, structure, control, tuple(said))
+
+
+def not_used(root: Node, sections: tuple[str, ...]) -> list[str]:
+    """On sections of a file that hold something and are not used."""
+    unused = [key[:40] for key, value in root.items().items() if key not in sections and value.value]
+    return [left_behind(f"not used: {', '.join(unused)[:120]}")] if unused else []
 
 
 def _is_text(table: Node, key: str) -> bool:
     return table.has(key) and isinstance(table.get(key).value, str) and bool(table.get(key).value)
 
 
-def _pose(node: Node, matrix: np.ndarray, centre: Node) -> tuple[np.ndarray, np.ndarray]:
+def pose_of(node: Node, matrix: np.ndarray, centre: Node) -> tuple[np.ndarray, np.ndarray]:
     """Rotation from x right, y down, z forwards to the world, and projection centre."""
     if len(matrix) != 9:
         raise node.error("its rotation does not have 9 numbers", REMEDY)
-    return rotation_matrix(matrix, node.error("its rotation is none", REMEDY)).T, np.array(_numbers(centre, 3))
+    return rotation_matrix(matrix, node.error("its rotation is none", REMEDY)).T, np.array(numbers_of(centre, 3))
 
 
 def _openmvg_camera(value: Node) -> PixelCamera:
@@ -180,20 +180,20 @@ def _openmvg_camera(value: Node) -> PixelCamera:
     lens: dict[str, float] = {}
     for key, names in OPENMVG_LENS.items():
         if data.has(key):
-            lens = dict(zip(names, _numbers(data.get(key), len(names)), strict=True))
-    focal = _number(own.get("focal_length"))
-    x, y = _numbers(own.get("principal_point"), 2)
-    return _checked(value, _size(own), (focal, focal), (x, y), lens, data.has("fisheye"))
+            lens = dict(zip(names, numbers_of(data.get(key), len(names)), strict=True))
+    focal = number_of(own.get("focal_length"))
+    x, y = numbers_of(own.get("principal_point"), 2)
+    return checked(value, size_of(own), (focal, focal), (x, y), lens, data.has("fisheye"))
 
 
-def _size(node: Node) -> tuple[int, int]:
-    width, height = _number(node.get("width")), _number(node.get("height"))
+def size_of(node: Node) -> tuple[int, int]:
+    width, height = number_of(node.get("width")), number_of(node.get("height"))
     if width % 1.0 or height % 1.0:
         raise node.error("width and height are no format", REMEDY)
     return int(width), int(height)
 
 
-def _checked(
+def checked(
     node: Node, size: tuple[int, int], focal: tuple[float, float], centre: tuple[float, float], lens: dict[str, float],
     fisheye: bool,
 ) -> PixelCamera:  # fmt: skip
@@ -204,66 +204,14 @@ def _checked(
 
 def _openmvg_point(entry: Node) -> tuple[str, list[float], list[tuple[str, float, float]]]:
     value, seen = entry.get("value"), []
-    for one in _of(value, "observations"):
-        x, y = _numbers(one.get("value").get("x"), 2)
-        seen.append((_key(one.get("key")), x, y))
-    return _key(entry.get("key")), _numbers(value.get("X"), 3), seen
+    for one in section_of(value, "observations"):
+        x, y = numbers_of(one.get("value").get("x"), 2)
+        seen.append((key_of(one.get("key")), x, y))
+    return key_of(entry.get("key")), numbers_of(value.get("X"), 3), seen
 
 
-def _alicevision_scene(root: Node) -> _Scene:
-    version = tuple(int(_number(node)) for node in _of(root, "version"))
-    poses = {}
-    for entry in _of(root, "poses"):
-        transform = entry.get("pose").get("transform")
-        columns = np.array(_numbers(transform.get("rotation"), 9))
-        poses[_key(entry.get("poseId"))] = _pose(entry, columns.reshape(3, 3).T.ravel(), transform.get("center"))
-    views, rigs = {}, 0
-    for view in _of(root, "views"):
-        pose = poses.get(_key(view.get("poseId"))) if view.has("poseId") else None
-        if view.has("rigId") and _key(view.get("rigId")) not in NO_RIG:
-            rigs, pose = rigs + 1, None
-        views[_key(view.get("viewId"))] = view.get("path").text(), _key(view.get("intrinsicId")), pose
-    cameras = {_key(one.get("intrinsicId")): _alicevision_camera(one, version) for one in _of(root, "intrinsics")}
-    points = []
-    for entry in _of(root, "structure"):
-        seen = []
-        for one in _of(entry, "observations"):
-            x, y = _numbers(one.get("x"), 2)
-            seen.append((_key(one.get("observationId")), x, y))
-        points.append((_key(entry.get("landmarkId")), _numbers(entry.get("X"), 3), seen))
-    said = left_behind(f"not used: rigs; {counted(rigs, 'photograph')} of them without start orientation")
-    return _Scene(views, cameras, points, [], (said,) if rigs else ())
-
-
-def _alicevision_camera(node: Node, version: tuple[int, ...]) -> PixelCamera:
-    kind, (width, height) = node.get("type").text(), _size(node)
-    if node.has("distortionType") and node.get("distortionType").value:
-        kind = node.get("distortionType").text()
-    values = _numbers(node.get("distortionParams")) if node.has("distortionParams") else []
-    if kind not in ALICEVISION_LENS or (len(values) != len(ALICEVISION_LENS[kind]) and any(values)):
-        known = ", ".join(ALICEVISION_LENS)
-        raise node.error(f"a camera of type {kind[:40]} cannot be expressed", f"known are {known}")
-    lens = dict(zip(ALICEVISION_LENS[kind], values, strict=False))
-    x, y = _numbers(node.get("principalPoint"), 2)
-    if node.has("focalLength"):
-        sensor = _number(node.get("sensorWidth"))
-        if sensor <= 0.0:
-            raise node.error("has a focal length in mm and no size of the sensor", "state the size of the sensor")
-        fx = _number(node.get("focalLength")) * width / sensor
-        ratio = _number(node.get("pixelRatio")) if node.has("pixelRatio") else 1.0
-        if ratio != 1.0 and version < RATIO_SINCE:
-            raise node.error("has a pixelRatio of an older version", "export the scene with a newer version")
-        focal, centre = (fx, fx * ratio), (width / 2.0 + x, height / 2.0 + y)
-    else:
-        stated = node.get("pxFocalLength")
-        both = _numbers(stated, 2) if isinstance(stated.value, list) else [_number(stated)] * 2
-        focal, centre = (both[0], both[1]), (x, y)
-    return _checked(node, (width, height), focal, centre, lens, kind == "fisheye4")
-
-
-def _reading(scene: _Scene, path: Path, pixel_um: float) -> Reading:
-    if not scene.views:
-        raise InputError("holds no photographs", REMEDY, path)
+def reading_of(scene: Scene, path: Path, pixel_um: float) -> Reading:
+    scene, said = _with_cameras(scene, path)
     used = list(dict.fromkeys(camera for _, camera, _ in scene.views.values()))
     missing = [key for key in used if key not in scene.cameras]
     if missing:
@@ -284,15 +232,35 @@ def _reading(scene: _Scene, path: Path, pixel_um: float) -> Reading:
         *points,
         kept=control,
     ).reading(path.stem)
-    said = [left_behind(f"left out: {counted(left, 'image point')} of photographs that are not there, or twice in one")]
-    messages: list[str] = [*scene.messages, *(said if left else ()), "coordinates are local"]
+    if left:
+        words = f"left out: {counted(left, 'image point')} of photographs that are not there, or twice in one"
+        said.append(left_behind(words))
+    messages: list[str] = [*scene.messages, *said, "coordinates are local"]
     if scene.control:
         messages.append(assumed(f"control points have a standard deviation of {CONTROL_SIGMA_M:g} m"))
     return replace(_with_control(reading, scene), messages=tuple(messages))
 
 
+def _with_cameras(scene: Scene, path: Path) -> tuple[Scene, list[str]]:
+    """The scene without photographs that have no camera, as programs leave those they could not use; what to say.
+
+    Raises
+    ------
+    InputError
+        When none remains.
+    """
+    if not scene.views:
+        raise InputError("holds no photographs", REMEDY, path)
+    views = {key: view for key, view in scene.views.items() if view[1] not in UNDEFINED}
+    if not views:
+        raise InputError("none of its photographs has a camera", "export the scene after its reconstruction", path)
+    count = len(scene.views) - len(views)
+    said: list[str] = [left_behind(f"left out: {counted(count, 'photograph')} without a camera")] if count else []
+    return replace(scene, views=views), said
+
+
 def _points(
-    scene: _Scene,
+    scene: Scene,
 ) -> tuple[tuple[list[str], np.ndarray, np.ndarray, np.ndarray, np.ndarray], int]:
     """Names, coordinates, and image, point and pixels of the rays; and how many were left out."""
     row = {key: k for k, key in enumerate(scene.views)}
@@ -317,11 +285,11 @@ def _points(
 
 
 CONTROL_SIGMA_M = 0.01
-"""Standard deviation of control points, which OpenMVG does not know; chosen [C]."""
+"""Standard deviation of control points, which these programs do not know; chosen [C]."""
 
 
-def _with_control(reading: Reading, scene: _Scene) -> Reading:
-    """Control points of OpenMVG as such."""
+def _with_control(reading: Reading, scene: Scene) -> Reading:
+    """Control points as such."""
     if not scene.control or reading.points is None:
         return reading
     count = len(scene.control)
