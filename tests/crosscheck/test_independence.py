@@ -1,6 +1,7 @@
 """The independent model shares no formula with ours, and yet says the same."""
 
 import ast
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from aerotri.crosscheck.pattern_check import pattern_errors
 from aerotri.functional_model.additional_parameters import brown, lens, parameter_set
 from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
+from aerotri.observations import Prior
 from family_cameras import camera_for, sets_of
 
 SOURCE = Path(aerotri.__file__).parent
@@ -83,15 +85,23 @@ def test_heads_of_the_dmc_on_their_seams():
     np.testing.assert_allclose(paper_dmc.dmc(x, y, "+y", ours.items), ours.basis(x, y), rtol=1e-12, atol=1e-10)
 
 
+def test_heads_of_a_dmc_with_other_principal_distance_and_format():
+    """As calibrated: the formulas take the camera's own."""
+    camera = camera_for("dmc")
+    interior = {**camera.interior, "focal_length_mm": Prior(119.4)}
+    other = replace(camera, interior=interior, size_px=(13000, 7900))
+    for names in sets_of("dmc"):
+        assert max(pattern_errors(other, names).values()) < 1e-12
+
+
 def test_the_butterfly_closes_the_seams():
-    """Turns of the heads as models.md prints them, to its digits; signs of the first and third by another rotation."""
-    np.testing.assert_allclose(np.abs(paper_dmc._stitching()), [0.1887, 0.2704, 0.0264], atol=5e-5)
-    up = np.linspace(0.0, paper_dmc.HALF_ALONG, 41)
-    out = np.linspace(0.0, paper_dmc.HALF_ACROSS, 41)
-    columns = paper_dmc._small_turns(0.0 * up, up), paper_dmc._small_turns(out, 0.0 * out)
-    turns = np.array([1.0, *paper_dmc._stitching()])
-    gap = np.concatenate([turns @ [dx for dx, _ in columns[0]], turns @ [dy for _, dy in columns[1]]])
-    assert np.sqrt(np.mean(gap**2)) == pytest.approx(0.87, abs=0.01)
+    """Turns of a head as models.md prints them, to its digits; signs of the first and third by another rotation."""
+    image = paper_dmc.Composed()
+    np.testing.assert_allclose(np.abs(paper_dmc.stitching(image)), [0.1887, 0.2704, 0.0264], atol=5e-5)
+    up, out, zero = np.linspace(0.0, image.half_along, 41), np.linspace(0.0, image.half_across, 41), np.zeros(41)
+    gap_across, _ = paper_dmc.stitched(zero, up, (zero + 1.0, zero + 1.0), image)
+    _, gap_along = paper_dmc.stitched(out, zero, (zero + 1.0, zero + 1.0), image)
+    assert np.sqrt(np.mean(np.concatenate([gap_across, gap_along]) ** 2)) == pytest.approx(0.87, abs=0.01)
 
 
 def test_patterns_at_the_image_centre_are_zero():

@@ -9,16 +9,13 @@ upper right.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-PRINCIPAL_DISTANCE = 120.0
-"""Of the heads and of the composed image, mm [L]."""
 TILT_ACROSS, TILT_ALONG = np.radians(16.0), np.radians(11.0)
 """Inclination of the axis of a head across and along the flight [D]."""
-HALF_ACROSS, HALF_ALONG = 6912.0 * 0.012, 3840.0 * 0.012
-"""Half extent of the composed image of 13824 × 7680 pixels of 12 µm, mm [L]."""
 HALF_DIAGONAL_OF_HEAD = float(np.hypot(3584.0, 2048.0)) * 0.012
 """Of the 7168 × 4096 pixels of a head, mm [L]."""
 NORMAL_DIAGONAL = 115.0 * 2.0**0.5
@@ -38,12 +35,27 @@ ITEMS = (*SYNCHRONISATION, *ORIENTATION_X, *ORIENTATION_Y, *RADIAL, BUTTERFLY, C
 """Numbers of the special parameters of the DMC that are patterns of the image [P]."""
 
 
-def dmc(x: np.ndarray, y: np.ndarray, flight_axis: str, items: tuple[str, ...]) -> np.ndarray:
+@dataclass(frozen=True)
+class Composed:
+    """The composed image: principal distance, of the heads too, and half extent across and along the flight, mm.
+
+    120 mm, and 82.944 × 46.08 mm of the 13824 × 7680 pixels of 12 µm [L], where the camera states no others.
+    """
+
+    principal_distance: float = 120.0
+    half_across: float = 82.944
+    half_along: float = 46.08
+
+
+def dmc(
+    x: np.ndarray, y: np.ndarray, flight_axis: str, items: tuple[str, ...], image: Composed | None = None
+) -> np.ndarray:
     """Special parameters of BLUH for the DMC [P: Spreckels, Schlienkamp, Jacobsen, Table 1; geometry of the heads D].
 
     Parameters
     ----------
     x, y : (m,) mm from the image centre. flight_axis : image axis along the flight. items : of `ITEMS`.
+    image : the composed image.
 
     Returns
     -------
@@ -54,25 +66,25 @@ def dmc(x: np.ndarray, y: np.ndarray, flight_axis: str, items: tuple[str, ...]) 
     right, forward = x * across[0] + y * across[1], x * along[0] + y * along[1]
     patterns = np.zeros((len(x), 2, len(items)))
     for column, item in enumerate(items):
-        d_across, d_along = _pattern(item, right, forward)
+        d_across, d_along = _pattern(item, right, forward, image or Composed())
         patterns[:, 0, column] = d_across * across[0] + d_along * along[0]
         patterns[:, 1, column] = d_across * across[1] + d_along * along[1]
     return patterns
 
 
-def _pattern(item: str, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _pattern(item: str, x: np.ndarray, y: np.ndarray, image: Composed) -> tuple[np.ndarray, np.ndarray]:
     """Image error across and along the flight per unit of a parameter, mm."""
     nothing = np.zeros(len(x))
     if item == COMMON_RADIAL:
-        parts = [_pattern(number, x, y) for number in RADIAL]
+        parts = [_pattern(number, x, y, image) for number in RADIAL]
         return sum((dx for dx, _ in parts), nothing), sum((dy for _, dy in parts), nothing)
     if item == BUTTERFLY:
-        return _butterfly(x, y)
+        return _butterfly(x, y, image)
     for numbers, formula in OF_ONE_HEAD:
         if item in numbers:
             head = numbers.index(item)
             inside = _quadrant(x, y) == head
-            dx, dy = formula(x, y, QUADRANTS[head])
+            dx, dy = formula(x, y, Head(QUADRANTS[head], image.principal_distance))
             return np.where(inside, dx, 0.0), np.where(inside, dy, 0.0)
     raise KeyError(item)
 
@@ -82,59 +94,63 @@ def _quadrant(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.where(y >= 0.0, np.where(x >= 0.0, 0, 1), np.where(x >= 0.0, 3, 2))
 
 
-def _head_rotation(signs: tuple[float, float]) -> np.ndarray:
-    """(3, 3) head → camera: Ry(−sx·16°)·Rx(sy·11°) [D]."""
-    about_y, about_x = -signs[0] * TILT_ACROSS, signs[1] * TILT_ALONG
-    cos_y, sin_y, cos_x, sin_x = np.cos(about_y), np.sin(about_y), np.cos(about_x), np.sin(about_x)
-    turn_y = np.array([[cos_y, 0.0, sin_y], [0.0, 1.0, 0.0], [-sin_y, 0.0, cos_y]])
-    turn_x = np.array([[1.0, 0.0, 0.0], [0.0, cos_x, -sin_x], [0.0, sin_x, cos_x]])
-    return turn_y @ turn_x
+@dataclass(frozen=True)
+class Head:
+    """A head: signs of x and y in its quadrant, and its principal distance, mm."""
 
+    signs: tuple[float, float]
+    principal_distance: float
 
-def _in_plane(direction: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Where a direction meets an image plane at the principal distance, mm; may be complex."""
-    u1, u2, u3 = direction
-    return -PRINCIPAL_DISTANCE * u1 / u3, -PRINCIPAL_DISTANCE * u2 / u3
+    def rotation(self) -> np.ndarray:
+        """(3, 3) head → camera: Ry(−sx·16°)·Rx(sy·11°) [D]."""
+        about_y, about_x = -self.signs[0] * TILT_ACROSS, self.signs[1] * TILT_ALONG
+        cos_y, sin_y, cos_x, sin_x = np.cos(about_y), np.sin(about_y), np.cos(about_x), np.sin(about_x)
+        turn_y = np.array([[cos_y, 0.0, sin_y], [0.0, 1.0, 0.0], [-sin_y, 0.0, cos_y]])
+        turn_x = np.array([[1.0, 0.0, 0.0], [0.0, cos_x, -sin_x], [0.0, sin_x, cos_x]])
+        return turn_y @ turn_x
+
+    def in_plane(self, direction: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Where a direction meets an image plane at the principal distance, mm; may be complex."""
+        u1, u2, u3 = direction
+        return -self.principal_distance * u1 / u3, -self.principal_distance * u2 / u3
+
+    def direction(self, x: np.ndarray, y: np.ndarray) -> list[np.ndarray]:
+        """(ξ, η, −f) in the head of a position in the composed image."""
+        minus_f = np.full(len(x), -self.principal_distance)
+        xi, eta = self.in_plane(_turned(self.rotation().T, [x, y, minus_f]))
+        return [xi, eta, minus_f]
+
+    def displacement(self, direction: list[np.ndarray], change: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """How the position in the composed image changes with the direction in the head, by the complex step."""
+        moved = [part + 1j * STEP * by for part, by in zip(direction, change, strict=True)]
+        x, y = self.in_plane(_turned(self.rotation(), moved))
+        return np.imag(x) / STEP, np.imag(y) / STEP
 
 
 def _turned(matrix: np.ndarray, vector: list[np.ndarray]) -> list[np.ndarray]:
     return [matrix[i, 0] * vector[0] + matrix[i, 1] * vector[1] + matrix[i, 2] * vector[2] for i in range(3)]
 
 
-def _in_head(x: np.ndarray, y: np.ndarray, signs: tuple[float, float]) -> list[np.ndarray]:
-    """Direction (ξ, η, −f) in a head of a position in the composed image."""
-    xi, eta = _in_plane(_turned(_head_rotation(signs).T, [x, y, np.full(len(x), -PRINCIPAL_DISTANCE)]))
-    return [xi, eta, np.full(len(x), -PRINCIPAL_DISTANCE)]
-
-
-def _displacement(
-    head: list[np.ndarray], change: list[np.ndarray], signs: tuple[float, float]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Derivative of the position in the composed image when the direction in a head changes so, by the complex step."""
-    moved = [part + 1j * STEP * by for part, by in zip(head, change, strict=True)]
-    x, y = _in_plane(_turned(_head_rotation(signs), moved))
-    return np.imag(x) / STEP, np.imag(y) / STEP
-
-
-def _radial(x: np.ndarray, y: np.ndarray, signs: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+def _radial(x: np.ndarray, y: np.ndarray, head: Head) -> tuple[np.ndarray, np.ndarray]:
     """−(ξ, η)·((s·ρ)² − 16384) of a head, seen in the composed image [D]."""
-    head = _in_head(x, y, signs)
+    direction = head.direction(x, y)
+    xi, eta, _ = direction
     enlargement = NORMAL_DIAGONAL / HALF_DIAGONAL_OF_HEAD
-    factor = -(enlargement**2 * (head[0] ** 2 + head[1] ** 2) - 16384.0)
-    return _displacement(head, [factor * head[0], factor * head[1], np.zeros(len(x))], signs)
+    factor = -(enlargement**2 * (xi**2 + eta**2) - 16384.0)
+    return head.displacement(direction, [factor * xi, factor * eta, np.zeros(len(x))])
 
 
-def _synchronisation(x: np.ndarray, y: np.ndarray, signs: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+def _synchronisation(x: np.ndarray, y: np.ndarray, head: Head) -> tuple[np.ndarray, np.ndarray]:
     """A delay of the shutter acts along the flight: y² − 32·|y| [P, its axis D]."""
     return 0.0 * x, y**2 - 32.0 * np.abs(y)
 
 
-def _orientation_x(x: np.ndarray, y: np.ndarray, signs: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+def _orientation_x(x: np.ndarray, y: np.ndarray, head: Head) -> tuple[np.ndarray, np.ndarray]:
     """−x·y across the flight [P]."""
     return -x * y, 0.0 * x
 
 
-def _orientation_y(x: np.ndarray, y: np.ndarray, signs: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+def _orientation_y(x: np.ndarray, y: np.ndarray, head: Head) -> tuple[np.ndarray, np.ndarray]:
     """−x·y along the flight [P]."""
     return 0.0 * x, -x * y
 
@@ -145,66 +161,67 @@ OF_ONE_HEAD = (
     (ORIENTATION_Y, _orientation_y),
     (RADIAL, _radial),
 )
-"""Numbers of heads 1 to 4, and the image error in a head by x, y and the signs of its quadrant."""
+"""Numbers of heads 1 to 4, and the image error in a head by x, y and the head."""
 
 
-def _small_turns(x: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+def _small_turns(x: np.ndarray, y: np.ndarray, image: Composed) -> list[tuple[np.ndarray, np.ndarray]]:
     """Displacements by a longer principal distance of head 1, and by small turns of it about its three axes."""
-    head = _in_head(x, y, QUADRANTS[0])
+    head = Head(QUADRANTS[0], image.principal_distance)
+    direction = head.direction(x, y)
     nothing = np.zeros(len(x))
-    changes = [[head[0], head[1], nothing]]
+    changes = [[direction[0], direction[1], nothing]]
     for axis in range(3):
         i, j = (axis + 1) % 3, (axis + 2) % 3
         turn = [nothing, nothing, nothing]
-        turn[i], turn[j] = -head[j], head[i]
+        turn[i], turn[j] = -direction[j], direction[i]
         changes.append(turn)
-    return [_displacement(head, change, QUADRANTS[0]) for change in changes]
+    return [head.displacement(direction, change) for change in changes]
 
 
-@lru_cache(maxsize=1)
-def _stitching() -> tuple[float, float, float]:
+@lru_cache(maxsize=16)
+def stitching(image: Composed) -> tuple[float, float, float]:
     """Turns of head 1 that close the seams best when its principal distance grows [D]: dx(0, y) = 0, dy(x, 0) = 0."""
     zero = np.zeros(SEAM_POINTS)
-    up = _small_turns(zero, np.linspace(0.0, HALF_ALONG, SEAM_POINTS))
-    out = _small_turns(np.linspace(0.0, HALF_ACROSS, SEAM_POINTS), zero)
+    up = _small_turns(zero, np.linspace(0.0, image.half_along, SEAM_POINTS), image)
+    out = _small_turns(np.linspace(0.0, image.half_across, SEAM_POINTS), zero, image)
     gaps = np.array([np.concatenate([dx, dy]) for (dx, _), (_, dy) in zip(up, out, strict=True)])
     turns = np.linalg.lstsq(gaps[1:].T, -gaps[0], rcond=None)[0]
     return float(turns[0]), float(turns[1]), float(turns[2])
 
 
-def _stitched(x: np.ndarray, y: np.ndarray, signs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def stitched(
+    x: np.ndarray, y: np.ndarray, signs: tuple[np.ndarray, np.ndarray], image: Composed
+) -> tuple[np.ndarray, np.ndarray]:
     """The butterfly before the orientation is taken off: quadrant 1, mirrored to the others by the signs of x and y."""
-    longer, *turns = _small_turns(np.abs(x), np.abs(y))
+    longer, *turns = _small_turns(np.abs(x), np.abs(y), image)
     dx, dy = longer
-    for by, (tx, ty) in zip(_stitching(), turns, strict=True):
+    for by, (tx, ty) in zip(stitching(image), turns, strict=True):
         dx, dy = dx + by * tx, dy + by * ty
     return signs[0] * dx, signs[1] * dy
 
 
-def _orientation(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def _orientation(x: np.ndarray, y: np.ndarray, f: float) -> np.ndarray:
     """(2m, 6): what shifts, scale, rotation and tilts of a photograph over flat ground do."""
-    f, one, zero = PRINCIPAL_DISTANCE, np.ones(len(x)), np.zeros(len(x))
+    one, zero = np.ones(len(x)), np.zeros(len(x))
     pairs = [(one, zero), (zero, one), (x, y), (-y, x), (f + x**2 / f, x * y / f), (x * y / f, f + y**2 / f)]
     return np.stack([np.concatenate(pair) for pair in pairs], axis=1)
 
 
-@lru_cache(maxsize=1)
-def _absorbed() -> np.ndarray:
+@lru_cache(maxsize=16)
+def _absorbed(image: Composed) -> np.ndarray:
     """(6,) what the orientation of a photograph takes of the stitched butterfly, by least squares over the format."""
-    columns, rows = GRID
-    x, y = (
-        part.ravel()
-        for part in np.meshgrid(
-            np.linspace(-HALF_ACROSS, HALF_ACROSS, columns), np.linspace(-HALF_ALONG, HALF_ALONG, rows)
-        )
+    across, along = (
+        half * np.arange(-(count // 2), count // 2 + 1) / (count // 2)
+        for half, count in zip((image.half_across, image.half_along), GRID, strict=True)
     )
+    x, y = (part.ravel() for part in np.meshgrid(across, along))
     # the two heads at a seam err oppositely: on the seam itself their mean counts, which is 0
-    stitched = _stitched(x, y, (np.sign(x), np.sign(y)))
-    return np.linalg.lstsq(_orientation(x, y), np.concatenate(stitched), rcond=None)[0]
+    pattern = np.concatenate(stitched(x, y, (np.sign(x), np.sign(y)), image))
+    return np.linalg.lstsq(_orientation(x, y, image.principal_distance), pattern, rcond=None)[0]
 
 
-def _butterfly(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _butterfly(x: np.ndarray, y: np.ndarray, image: Composed) -> tuple[np.ndarray, np.ndarray]:
     """A common change of the principal distance of the heads, less what stitching and orientation absorb [D]."""
-    dx, dy = _stitched(x, y, (np.where(x >= 0.0, 1.0, -1.0), np.where(y >= 0.0, 1.0, -1.0)))
-    absorbed = _orientation(x, y) @ _absorbed()
+    dx, dy = stitched(x, y, (np.where(x >= 0.0, 1.0, -1.0), np.where(y >= 0.0, 1.0, -1.0)), image)
+    absorbed = _orientation(x, y, image.principal_distance) @ _absorbed(image)
     return dx - absorbed[: len(x)], dy - absorbed[len(x) :]

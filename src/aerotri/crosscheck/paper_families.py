@@ -13,7 +13,7 @@ import numpy as np
 
 from aerotri.crosscheck import paper_patterns, paper_polynomials
 from aerotri.crosscheck.paper_dmc import ITEMS as DMC_ITEMS
-from aerotri.crosscheck.paper_dmc import dmc
+from aerotri.crosscheck.paper_dmc import Composed, dmc
 from aerotri.observations import Camera
 
 DEFAULT_AXIS = "+y"
@@ -50,7 +50,9 @@ def _ultracam_d(camera: Camera, x: np.ndarray, y: np.ndarray, items: tuple[str, 
 
 
 def _dmc(camera: Camera, x: np.ndarray, y: np.ndarray, items: tuple[str, ...]) -> np.ndarray:
-    return dmc(x, y, camera.flight_axis or DEFAULT_AXIS, items)
+    axis, half = camera.flight_axis or DEFAULT_AXIS, camera.half_format_mm
+    across, along = half if axis[1] == "y" else half[::-1]
+    return dmc(x, y, axis, items, Composed(camera.focal_length_mm, across, along))
 
 
 def _over_format(name: str, camera: Camera, x: np.ndarray, y: np.ndarray, items: tuple[str, ...]) -> np.ndarray:
