@@ -27,6 +27,7 @@ COMMANDS = {
     "volume of a surface": ("volume {} --base level:101 --out O --no-plots", ".tif"),
     "volume in GeoJSON": ("volume s.tif --boundary {} --base level:101 --out O --no-plots", ".geojson"),
     "volume in a GeoPackage": ("volume s.tif --boundary {} --base level:101 --out O --no-plots", ".gpkg"),
+    "volume in a Shapefile": ("volume s.tif --boundary {} --base level:101 --out O --no-plots", ".shp"),
     "volume in WKT": ("volume s.tif --boundary {} --base level:101 --out O --no-plots", ".txt"),
     "compare": ("compare {} s.tif --out O --no-plots", ".laz"),
     "change": ("change {} s.tif --out O --no-plots", ".tif"),

@@ -29,8 +29,8 @@ def change(
     stable: Annotated[
         str | None,
         typer.Option(
-            help="Ground that did not change: GeoPackage, GeoJSON, WKT file or WKT text. The second surface is aligned "
-            "on it.",
+            help="Ground that did not change: file of polygons (GeoPackage, GeoJSON, Shapefile, FlatGeobuf, KML, DXF, "
+            "WKT) or WKT text. The second surface is aligned on it.",
             rich_help_panel=METHOD,
         ),
     ] = None,

@@ -108,7 +108,8 @@ def demcor(
     models: Annotated[
         Path | None,
         typer.Option(
-            help="Map of the models: polygons (GeoJSON, GeoPackage) with left and right, or a raster.",
+            help="Map of the models: polygons (GeoPackage, GeoJSON, Shapefile, FlatGeobuf) with left and right, or a "
+            "raster.",
             rich_help_panel=INPUT,
         ),
     ] = None,

@@ -23,7 +23,8 @@ def plan(
     area: Annotated[
         str,
         typer.Argument(
-            help="Polygon to be flown: GeoPackage, GeoJSON, WKT file or WKT text.", rich_help_panel=ARGUMENTS
+            help="Polygon to be flown: file (GeoPackage, GeoJSON, Shapefile, FlatGeobuf, KML, DXF, WKT) or WKT text.",
+            rich_help_panel=ARGUMENTS,
         ),
     ],
     camera: Annotated[

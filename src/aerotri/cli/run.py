@@ -84,9 +84,9 @@ def run(
     boundary: Annotated[
         str,
         typer.Option(
-            help="Boundary of a volume: GeoPackage, GeoJSON or WKT. Without it there is no volume. It is measured on "
-            "the terrain (OUT/dtm, of which --layer chooses the surface), and on the dense surface (OUT/dsm), whatever "
-            "--layer says.",
+            help="Boundary of a volume: GeoPackage, GeoJSON, Shapefile, FlatGeobuf, KML, DXF or WKT. Without it there "
+            "is no volume. It is measured on the terrain (OUT/dtm, of which --layer chooses the surface), and on the "
+            "dense surface (OUT/dsm), whatever --layer says.",
             rich_help_panel=SURFACE,
         ),
     ] = "",

@@ -133,7 +133,7 @@ def dtm(
     ] = DEFAULTS.most_photographs,
     breaklines: Annotated[
         Path | None,
-        typer.Option(help="Lines with heights: .gpkg, .geojson or .dxf.", rich_help_panel=INPUT),
+        typer.Option(help="Lines with heights: .gpkg, .geojson, .shp, .fgb or .dxf.", rich_help_panel=INPUT),
     ] = None,
     ground_within: Annotated[
         str | None,

@@ -55,8 +55,9 @@ def volume(
     boundary: Annotated[
         str | None,
         typer.Option(
-            help="GeoPackage, GeoJSON, WKT file or WKT text; several polygons, and the parts of one feature, are "
-            "piles, each with its own base and volume. Default: the whole surface.",
+            help="File of polygons (GeoPackage, GeoJSON, Shapefile, FlatGeobuf, KML, DXF, WKT) or WKT text; several "
+            "polygons, and the parts of one feature, are piles, each with its own base and volume. Default: the whole "
+            "surface.",
             rich_help_panel=SURFACE,
         ),
     ] = None,

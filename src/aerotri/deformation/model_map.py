@@ -85,7 +85,7 @@ class NumberMap:
 
 
 def read_polygons(path: Path, crs: str = "") -> PolygonMap:
-    """Polygons of models from GeoJSON or GeoPackage.
+    """Polygons of models from a file of polygons.
 
     Parameters
     ----------

@@ -14,9 +14,10 @@ from shapely.geometry.base import BaseGeometry
 from aerotri.conventions import InputError
 from aerotri.crs_text import system_in_words
 from aerotri.vectors.crs import LON_LAT, stated_crs
+from aerotri.vectors.gdal_layers import ENDINGS, read_layers
 from aerotri.vectors.geojson import GeoJsonFeature, crs_of_name, read_geojson
 from aerotri.vectors.geopackage import read_geopackage
-from aerotri.vectors.polygons import srid_of_wkt
+from aerotri.vectors.polygons import VECTOR_ENDINGS, polygon_layer, srid_of_wkt
 from aerotri.volume.boundary import read_boundary
 
 
@@ -54,7 +55,7 @@ class Area:
 
 
 def read_area(source: str, wanted: str | None = None) -> Area:
-    """The area of GeoPackage, GeoJSON, a WKT file or a WKT text.
+    """The area of a file with polygons (see `VECTOR_ENDINGS`), a WKT file or a WKT text.
 
     Longitudes and latitudes are brought to the CRS wanted, else to the UTM zone of their middle.
 
@@ -71,9 +72,7 @@ def read_area(source: str, wanted: str | None = None) -> Area:
     target = wanted
     if target is None and own is not None:
         target = _metric(own, source)
-    if own is not None and own.upper() in (LON_LAT, "EPSG:4326") and Path(source).suffix.lower() not in (
-        ".gpkg", ".geojson", ".json",
-    ):  # fmt: skip
+    if own is not None and own.upper() in (LON_LAT, "EPSG:4326") and Path(source).suffix.lower() not in VECTOR_ENDINGS:
         own = LON_LAT
     boundary = read_boundary(source, target or "")
     polygon = boundary.polygon
@@ -119,6 +118,10 @@ def _own_crs(source: str) -> str | None:
         name, features = read_geojson(path)
         stated = stated_crs(crs_of_name(name))
         return stated or (LON_LAT if _like_degrees(features) else None)
+    if suffix in ENDINGS:
+        return polygon_layer(read_layers(path), path).crs
+    if suffix in VECTOR_ENDINGS:
+        return None
     return srid_of_wkt(path.read_text(encoding="utf-8-sig")) if _is_text(path) else None
 
 

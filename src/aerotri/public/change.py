@@ -180,8 +180,8 @@ def change(
         taken. A GeoTIFF in degrees or feet is brought to metres: to the system of the other one where that is in
         metres, else to the UTM zone of the first.
     second : the later surface.
-    stable : ground that did not change: GeoPackage, GeoJSON or WKT file, WKT text, or a shapely polygon. The second
-        surface is aligned on it, and it tells the noise.
+    stable : ground that did not change: file of polygons as for `aerotri.volume`, WKT text, or a shapely polygon.
+        The second surface is aligned on it, and it tells the noise.
     align : what the second surface is moved by on stable ground: 'none', 'height', 'shift' (X, Y and height) or 'tilt'
         (these and two tilts).
     area : where volumes are wanted: as `stable`, or polygons by their names; all that both have in common where

@@ -145,8 +145,8 @@ def correct_dem(
     dem : raster of heights in the coordinate system of the block, or a surface in memory.
     result : an adjustment with additional parameters, or the folder of one.
     pair : the two photographs the whole DEM was made of, left and right.
-    models : map of the models: polygons (GeoJSON, GeoPackage) with left and right; a raster of numbers; or what
-        `aerotri.deform` found for a block, or `aerotri.terrain` with pairs.
+    models : map of the models: polygons (GeoPackage, GeoJSON, Shapefile, FlatGeobuf) with left and right; a raster of
+        numbers; or what `aerotri.deform` found for a block, or `aerotri.terrain` with pairs.
     model_table : table number,left,right of a raster; NAME.csv or models.csv beside it where None.
     orientation : the one the DEM was made with: a result or its folder, images.csv, or 'absorbed' (of an adjustment
         without additional parameters); that of `result` where None.

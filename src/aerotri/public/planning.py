@@ -200,7 +200,7 @@ def plan_flight(
 
     Parameters
     ----------
-    area : GeoPackage, GeoJSON or WKT file with a polygon, or WKT text.
+    area : file of polygons as for `aerotri.volume`, or WKT text.
     camera : name of a camera that `aerotri simulate` knows, or a TOML file with one table [camera.NAME].
     gsd : m, size of a pixel on the mean ground.
     dem : GeoTIFF with the heights of the ground. ground : m, level of a plane; one of the two.

@@ -247,7 +247,7 @@ def terrain(
     agreeing : the same of three photographs and more whose rays meet; 1: never.
     edge : share of the format at its edge that is not used; 0.02, of pairs 0.10, where None.
     most_photographs : of a picket.
-    breaklines : file of lines with heights: .gpkg, .geojson or .dxf.
+    breaklines : file of lines with heights: .gpkg, .geojson, .shp, .fgb or .dxf.
     ground_within : outline within which everything is ground, as `aerotri.volume` takes its boundary: a stockpile is
         steep and would be taken off the DTM as an object.
     ideal : the photographs are those of `aerotri.ideal_photographs`, free of image errors.

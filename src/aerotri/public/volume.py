@@ -86,9 +86,10 @@ def volume(
     ----------
     surface : raster of heights; or what `aerotri.terrain` returned, or the folder it was written to, whose pickets
         are used for σ; or what `aerotri.dense_surface` returned, or its folder: σ and noise length of its cells count.
-    boundary : GeoPackage, GeoJSON or WKT file, WKT text, a shapely polygon, or polygons by their names; the whole
-        surface where None. Several polygons, and the parts of one feature, are piles: each is measured by itself,
-        with a base of its own, and their sum has a σ that knows what they share.
+    boundary : file of polygons (GeoPackage, GeoJSON, Shapefile, FlatGeobuf, KML, DXF or WKT), WKT text, a shapely
+        polygon, or polygons by their names; the whole surface where None. Several polygons, and the parts of one
+        feature, are piles: each is measured by itself, with a base of its own, and their sum has a σ that knows what
+        they share.
     layer : which surface of these: 'dsm' with objects (a pile is one), or 'dtm', the ground alone.
     base : height in m, 'level:H', 'plane:X,Y,Z;X,Y,Z;X,Y,Z', 'plane' (fitted to the boundary), 'boundary' (spline
         through it), 'lowest' (level of its lowest point), or another surface.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,10 @@ class VectorSystem:
 
     transformer: Any = None
     note: str = ""
+
+    def with_note(self, note: str) -> VectorSystem:
+        """The same, with another sentence behind its own; '' adds none."""
+        return replace(self, note="; ".join(text for text in (self.note, note) if text))
 
     def place(self, xy: np.ndarray, path: Path | None = None) -> np.ndarray:
         """(n, 2) in the system of the surface.
@@ -68,6 +72,13 @@ def vector_system(own: str | None, crs: str, name: str) -> VectorSystem:
         message = f"{name}: PROJ knows no way from {words} to {system_in_words(crs)}"
         raise InputError(message, "bring it into one CRS") from None
     return VectorSystem(transformer, f"{name} was brought from {words} to {system_in_words(crs)}")
+
+
+def vector_system_or_note(own: str | None, crs: str, name: str) -> VectorSystem:
+    """As `vector_system`; a file that names no CRS is told, where the surface has one."""
+    if own is None and crs:
+        return VectorSystem(None, f"{name} names no CRS: taken for {system_in_words(crs)}")
+    return vector_system(own, crs, name)
 
 
 def system_of_geojson(content: Mapping[str, Any], xy: np.ndarray, crs: str, name: str) -> VectorSystem:

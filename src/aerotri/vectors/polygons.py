@@ -1,4 +1,4 @@
-"""Polygons from GeoJSON, GeoPackage and WKT; heights of their corners are left out."""
+"""Polygons from GeoJSON, GeoPackage, Shapefile, FlatGeobuf, KML, DXF and WKT; heights of their corners are left out."""
 
 from __future__ import annotations
 
@@ -12,21 +12,27 @@ from shapely.geometry import shape
 from shapely.geometry.base import BaseGeometry
 
 from aerotri.conventions import InputError
-from aerotri.vectors.crs import VectorSystem, system_of_geojson, vector_system
+from aerotri.vectors.crs import VectorSystem, system_of_geojson, vector_system, vector_system_or_note
+from aerotri.vectors.drawing import outlines_of_drawing
+from aerotri.vectors.gdal_layers import ENDINGS, VectorLayer, read_layers
 from aerotri.vectors.geojson import LARGEST_M, crs_of_name, read_geojson
 from aerotri.vectors.geopackage import read_geopackage
 
-VECTOR_ENDINGS = (".geojson", ".json", ".gpkg")
+VECTOR_ENDINGS = (".geojson", ".json", ".gpkg", ".dxf", *ENDINGS)
+"""Of files with polygons."""
 KINDS = ("Polygon", "MultiPolygon")
 WKT_KINDS = ("POLYGON", "MULTIPOLYGON", "GEOMETRYCOLLECTION")
 WKT_REMEDY = "give POLYGON ((X Y, …)) or MULTIPOLYGON (((X Y, …)), ((X Y, …))), whose parts are piles"
-FILE_REMEDY = "give a GeoPackage (.gpkg), GeoJSON (.geojson, .json), or a text file with WKT: POLYGON ((X Y, …))"
+FILE_REMEDY = (
+    "give a GeoPackage (.gpkg), GeoJSON (.geojson, .json), Shapefile (.shp, also zipped), FlatGeobuf (.fgb), KML "
+    "(.kml, .kmz), DXF, or a text file with WKT: POLYGON ((X Y, …))"
+)
 
 Feature = tuple[Mapping[str, Any], BaseGeometry]
 
 
 def polygon_features(path: Path, crs: str = "") -> tuple[list[Feature], str]:
-    """Attributes and polygons of GeoJSON or GeoPackage, in the order of the file, and a sentence about their CRS.
+    """Attributes and polygons of a file, in its order, and a sentence about its CRS and what of it is not used.
 
     Parameters
     ----------
@@ -37,7 +43,9 @@ def polygon_features(path: Path, crs: str = "") -> tuple[list[Feature], str]:
     InputError
         When the file cannot be read, or a feature is no polygon.
     """
-    read = _gpkg_features if path.suffix.lower() == ".gpkg" else _geojson_features
+    suffix = path.suffix.lower()
+    readers = {".gpkg": _gpkg_features, ".dxf": _drawn_features}
+    read = readers.get(suffix, _library_features if suffix in ENDINGS else _geojson_features)
     found: list[Feature] = []
     number = 0
     try:
@@ -111,15 +119,64 @@ def _geojson_features(path: Path, crs: str) -> tuple[Sequence[tuple[Mapping[str,
 
 
 def _gpkg_features(path: Path, crs: str) -> tuple[Sequence[tuple[Mapping[str, Any], Any]], VectorSystem]:
-    layers, features, system = 0, [], VectorSystem()
-    for layers, (_, srs, rows) in enumerate(read_geopackage(path), start=1):
-        if layers > 1:
-            break
-        features = [(row.properties, _polygon(row.parts) if row.kind in KINDS else None) for row in rows]
-        system = vector_system(srs, crs, path.name)
-    if layers != 1:
-        raise InputError(f"has {layers or 'no'} layers", "give a GeoPackage with one layer of polygons", path)
+    names, features, system = [], [], VectorSystem()
+    for name, srs, rows in read_geopackage(path):
+        names.append(f"'{name}'")
+        if len(names) == 1:
+            features = [(row.properties, _polygon(row.parts) if row.kind in KINDS else None) for row in rows]
+            system = vector_system(srs, crs, path.name)
+    if len(names) != 1:
+        message = f"has {len(names)} layers: {', '.join(names)}" if names else "has no layers"
+        raise InputError(message, "give a GeoPackage with one layer of polygons", path)
     return features, system
+
+
+def _drawn_features(path: Path, crs: str) -> tuple[Sequence[tuple[Mapping[str, Any], Any]], VectorSystem]:
+    """A drawing names no CRS: its coordinates are those of the surface."""
+    outlines, note = outlines_of_drawing(path)
+    if not outlines:
+        raise InputError(
+            "has no closed polylines" + (f"; {note}" if note else ""), "close the polylines of the outlines", path
+        )
+    return outlines, vector_system_or_note(None, crs, path.name).with_note(note)
+
+
+def _library_features(path: Path, crs: str) -> tuple[Sequence[tuple[Mapping[str, Any], Any]], VectorSystem]:
+    layers = read_layers(path)
+    layer = polygon_layer(layers, path)
+    other = [f"'{one.name}' ({', '.join(one.kinds) or 'no geometry'})" for one in layers if one is not layer]
+    unused = f"{path.name}: layers without polygons, not used: {', '.join(other)}" if other else ""
+    features = [
+        (properties, _polygon_of(geometry, number, path))
+        for number, (properties, geometry) in enumerate(layer.features, start=1)
+    ]
+    return features, vector_system_or_note(layer.crs, crs, path.name).with_note(unused)
+
+
+def polygon_layer(layers: Sequence[VectorLayer], path: Path) -> VectorLayer:
+    """The one layer that holds polygons.
+
+    Raises
+    ------
+    InputError
+        Where there is none, or there are several: none is silently taken for all.
+    """
+    found = [layer for layer in layers if set(layer.kinds) & {*KINDS, "GeometryCollection"}]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        kinds = ", ".join(dict.fromkeys(kind for layer in layers for kind in layer.kinds)) or "nothing"
+        raise InputError(f"has no polygons, it holds {kinds}", "give polygons", path)
+    names = ", ".join(f"'{layer.name}'" for layer in found)
+    raise InputError(f"has {len(found)} layers with polygons: {names}", "give a file with one of them", path)
+
+
+def _polygon_of(geometry: BaseGeometry | None, number: int, path: Path) -> BaseGeometry | None:
+    if geometry is None or geometry.geom_type in KINDS:
+        return geometry
+    if geometry.geom_type == "GeometryCollection" and not geometry.is_empty:
+        return _united_parts(geometry, path)
+    raise InputError(f"feature {number} is a {geometry.geom_type}, no polygon", "give polygons only", path)
 
 
 def _polygon(parts: list[list[np.ndarray]]) -> BaseGeometry:

@@ -248,7 +248,7 @@ def _attribute_of_names(attributes: Sequence[Mapping[str, Any]]) -> str:
 
 
 def read_boundary(source: str, crs: str = "") -> Boundary:
-    """The boundary of a file (GeoPackage, GeoJSON, WKT) or of a WKT text; several polygons are piles.
+    """The boundary of a file (see `FILE_REMEDY`) or of a WKT text; several polygons are piles.
 
     Parameters
     ----------

@@ -1,17 +1,22 @@
-"""Breaklines: lines with heights from GeoPackage, GeoJSON or DXF."""
+"""Breaklines: lines with heights from GeoPackage, GeoJSON, Shapefile, FlatGeobuf or DXF."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import shapely
 
 from aerotri.conventions import InputError
 from aerotri.crs_text import plan_of
-from aerotri.vectors.crs import VectorSystem, system_of_geojson, vector_system
+from aerotri.vectors.crs import VectorSystem, system_of_geojson, vector_system, vector_system_or_note
+from aerotri.vectors.drawing import lines_of_drawing
+from aerotri.vectors.gdal_layers import ENDINGS, read_layers
 from aerotri.vectors.geojson import LARGEST_M, crs_of_name, read_geojson
 from aerotri.vectors.geopackage import read_geopackage
+
+REMEDY = "give breaklines as .gpkg, .geojson, .shp (also zipped), .fgb or .dxf"
+LINES = ("LineString", "MultiLineString")
 
 
 def read_breaklines(path: Path, crs: str | None = None) -> tuple[np.ndarray, ...]:
@@ -34,12 +39,15 @@ def breaklines_and_note(path: Path, crs: str | None = None) -> tuple[tuple[np.nd
     InputError
         When it cannot be read, or a line has no heights.
     """
+    suffix = path.suffix.lower()
+    if suffix in (".kml", ".kmz"):
+        raise InputError("heights in KML are seldom those of its lines, and in no stated system", REMEDY, path)
     readers = {".gpkg": _of_geopackage, ".dxf": _of_dxf, ".geojson": _of_geojson, ".json": _of_geojson}
-    reader = readers.get(path.suffix.lower())
+    reader = readers.get(suffix, _of_library if suffix in ENDINGS else None)
     if reader is None:
-        raise InputError("is of no known kind", "give breaklines as .gpkg, .geojson or .dxf", path)
+        raise InputError("is of no known kind", REMEDY, path)
     if not path.is_file():
-        raise InputError("there is no such file", "give breaklines as .gpkg, .geojson or .dxf", path)
+        raise InputError("there is no such file", REMEDY, path)
     parts, system = reader(path, plan_of(crs or ""))
     lines = [np.asarray(line, dtype=float) for line in parts]
     for number, line in enumerate(lines, start=1):
@@ -57,7 +65,7 @@ def _of_geojson(path: Path, crs: str) -> tuple[list[np.ndarray], VectorSystem]:
     name, features = read_geojson(path)
     lines = []
     for feature in features:
-        if feature.kind in ("LineString", "MultiLineString"):
+        if feature.kind in LINES:
             for line in [feature.coordinates] if feature.kind == "LineString" else feature.coordinates:
                 # a position without height makes all of its line one without
                 width = min((len(position) for position in line), default=0)
@@ -68,34 +76,22 @@ def _of_geojson(path: Path, crs: str) -> tuple[list[np.ndarray], VectorSystem]:
 
 def _of_dxf(path: Path, crs: str) -> tuple[list[np.ndarray], VectorSystem]:
     """A drawing names no CRS: its coordinates are those of the block."""
-    return list(_lines_of_dxf(path)), VectorSystem()
+    lines, note = lines_of_drawing(path)
+    return lines, VectorSystem(None, note)
 
 
-def _lines_of_dxf(path: Path) -> Iterator[np.ndarray]:
-    """Lines and polylines in three dimensions."""
-    try:
-        yield from list(_entities(path))
-    except Exception as error:  # ezdxf raises whatever a damaged file leads to
-        short = (str(error).splitlines() or [type(error).__name__])[0][:200]
-        raise InputError(f"cannot be read: {short}", "write the DXF anew, with lines with heights", path) from error
-
-
-def _entities(path: Path) -> Iterator[np.ndarray]:
-    import ezdxf
-    from ezdxf.entities import LWPolyline, Polyline
-
-    space = ezdxf.readfile(path).modelspace()
-    for entity in space.query("LINE"):
-        yield np.array([entity.dxf.start, entity.dxf.end], dtype=float)
-    for entity in space.query("POLYLINE"):
-        assert isinstance(entity, Polyline)
-        points = np.array([vertex.dxf.location for vertex in entity.vertices], dtype=float)
-        yield np.vstack([points, points[:1]]) if entity.is_closed else points
-    for entity in space.query("LWPOLYLINE"):
-        assert isinstance(entity, LWPolyline)
-        plan = np.array([(x, y) for x, y, *_ in entity.get_points()], dtype=float).reshape(-1, 2)
-        points = np.column_stack([plan, np.full(len(plan), float(entity.dxf.elevation))])
-        yield np.vstack([points, points[:1]]) if entity.closed else points
+def _of_library(path: Path, crs: str) -> tuple[list[np.ndarray], VectorSystem]:
+    """Lines of a Shapefile or FlatGeobuf; what is no line is named."""
+    lines, other, system = [], [], VectorSystem()
+    for layer in read_layers(path):
+        system = vector_system_or_note(layer.crs, crs, path.name)
+        other += [kind for kind in layer.kinds if kind not in LINES]
+        for _, geometry in layer.features:
+            if geometry is not None and geometry.geom_type in LINES:
+                has_z = bool(geometry.has_z)
+                lines += [shapely.get_coordinates(part, include_z=has_z) for part in shapely.get_parts(geometry)]
+    unused = f"{path.name} holds shapes that are no lines, not used: {', '.join(other)}" if other else ""
+    return lines, system.with_note(unused)
 
 
 def _of_geopackage(path: Path, crs: str) -> tuple[list[np.ndarray], VectorSystem]:
@@ -105,6 +101,6 @@ def _of_geopackage(path: Path, crs: str) -> tuple[list[np.ndarray], VectorSystem
         if len(systems) > 1:
             raise InputError("has layers in several CRS", "give one layer", path)
         for row in rows:
-            if row.kind in ("LineString", "MultiLineString"):
+            if row.kind in LINES:
                 lines += [line for part in row.parts for line in part]
     return lines, next(iter(systems.values()), VectorSystem())
