@@ -168,7 +168,7 @@ def test_breaklines_from_files(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("a.shp", b"", "no known kind"),
+        ("a.tab", b"", "no known kind"),
         ("a.gpkg", b"nonsense", "no GeoPackage that can be read"),
         ("a.geojson", b"{", "is not JSON"),
         ("a.geojson", b'{"features": []}', "no lines"),
