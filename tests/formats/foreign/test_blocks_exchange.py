@@ -133,18 +133,42 @@ def test_pieces_that_are_not_used_are_said(tmp_path):
     text = re.sub(
         r"(?s)(<Id>1</Id>.*?<Pose>)<Rotation>.*?</Rotation>(.*?)<Metadata>.*?</Metadata>", r"\1\2", text, count=1
     )
+    before = "<Rotation><Yaw>1</Yaw><Pitch>2</Pitch><Roll>3</Roll></Rotation><Odd>1</Odd>"
+    text = re.sub(r"(?s)(<Id>2</Id>.*?<Metadata>)", rf"\1{before}", text, count=1)
     text = text.replace("<HorizontalAccuracy>0.02</HorizontalAccuracy><VerticalAccuracy>0.04</VerticalAccuracy>", "", 1)
     text = re.sub(r"(<Name>gcp 1</Name>)", r"\1<Category>Horizontal</Category>", text)
     text = text.replace("<Measurement><PhotoId>0</PhotoId>", "<Measurement><PhotoId>77</PhotoId>", 1)
     reading = read(tmp_path, text)
     said = "\n".join(reading.messages)
-    assert "not used: Rig (1)" in said
+    assert "not used: Rig (1), Odd (1)" in said
+    assert "not used: the rotation before the adjustment, of 1 photograph" in said
     assert "not used: yaw, pitch and roll" in said
     assert "1 control point without accuracy: 0.01 m is taken" in said
     assert "1 position without accuracy: 10 m is taken" in said
     assert "left out: 1 image point of photographs that are not there" in said
     assert np.isnan(reading.block.images.angles).any(axis=1).tolist() == [True, True, False, False, False, False]
     assert np.isnan(reading.block.control.xyz).tolist()[1] == [False, False, True]
+
+
+def test_positions_beside_yaw_pitch_and_roll(tmp_path):
+    """Without a rotation that can be used a centre is a position, as one without any rotation."""
+    sample = BlocksExchange("utm")
+    angles = "<Rotation><Yaw>1</Yaw><Pitch>2</Pitch><Roll>3</Roll></Rotation>"
+    text = re.sub(r"<Rotation>.*?</Rotation>", angles, sample.text())
+    reading = read(tmp_path, re.sub(r"<Metadata>.*?</Metadata>", "", text))
+    assert reading.block.gnss_ins is not None
+    np.testing.assert_allclose(reading.block.gnss_ins.xyz, sample.coordinates(sample.centre), rtol=0, atol=1e-6)
+
+
+def test_a_control_point_without_all_coordinates_on_the_earth(tmp_path):
+    """Of earth-centred coordinates three are needed; one point that lacks some leaves the others what they are."""
+    text = BlocksExchange("earth").text()
+    text = re.sub(r"(<Name>gcp 1</Name>)", r"\1<Category>Horizontal</Category>", text)
+    reading, utm = read(tmp_path, text), BlocksExchange("utm")
+    assert any(message.startswith("left out: 1 control point without all three") for message in reading.messages)
+    np.testing.assert_allclose(
+        reading.block.control.xyz, utm.coordinates(utm.points)[[55, 57, 58, 59]], rtol=0, atol=2e-3
+    )
 
 
 @pytest.mark.parametrize(

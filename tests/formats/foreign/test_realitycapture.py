@@ -62,3 +62,12 @@ def test_errors(tmp_path, old, new, says):
         read_realitycapture(path)
     assert caught.value.line == 4
     assert caught.value.remedy
+
+
+@pytest.mark.parametrize("head", ["", "#cameras 4\n", "#name,x,y,alt,yaw,pitch,roll\n"])
+def test_a_list_without_names_of_its_columns(tmp_path, head):
+    path = tmp_path / "registrations.csv"
+    path.write_text(head + LIST.partition("roll,f,px,py,k1,k2,k3,k4,t1,t2\n")[2])
+    with pytest.raises(InputError, match="does not name its columns") as caught:
+        read_realitycapture(path)
+    assert "name,x,y,alt,heading,pitch,roll" in caught.value.remedy

@@ -281,10 +281,14 @@ def _with_control(
     keep = np.flatnonzero(known.any(axis=1))
     found = Control(keep, xyz[keep], np.where(missing, CONTROL_SIGMA_M, sigma)[keep], control.is_check[keep])
     count = int(missing.any(axis=1).sum())
-    said = f"{counted(count, 'control point')} without accuracy: {CONTROL_SIGMA_M:g} m is taken"
-    if not len(keep):
-        return replace(block, control=found), []
-    return replace(_on_datum(block), control=found), [assumed(said)] if count else []
+    lost = int((np.isfinite(control.xyz).any(axis=1) & ~known.any(axis=1)).sum())
+    said: list[str] = []
+    if count:
+        said.append(assumed(f"{counted(count, 'control point')} without accuracy: {CONTROL_SIGMA_M:g} m is taken"))
+    if lost:
+        words = f"left out: {counted(lost, 'control point')} without all three coordinates, which their system needs"
+        said.append(left_behind(words))
+    return replace(_on_datum(block) if len(keep) else block, control=found), said
 
 
 def _with_positions(
@@ -317,7 +321,7 @@ def _on_datum(block: Block) -> Block:
 
 def _about_photos(photos: _Photos, pixel_um: float | None) -> list[str]:
     said = []
-    for words, count in Counter(pose.left for pose in photos.poses if pose.left).items():
+    for words, count in Counter(words for pose in photos.poses for words in pose.left).items():
         said.append(f"not used: {words}, of {counted(count, 'photograph')}")
     if any(group.camera.focal_px[0] != group.camera.focal_px[1] for group in photos.groups):
         said.append(assumed("AspectRatio is taken as focal length along y by that along x"))

@@ -39,6 +39,9 @@ USED = {
         "AspectRatio", "Skew", "Photo", "ManualOpticalParams", "ManualPose",
     },
     "Photo": {"Id", "ImagePath", "Component", "Pose", "ExifData", "NearDepth", "MedianDepth", "FarDepth"},
+    "Pose": {"Rotation", "Center", "Metadata", "HorizontalAccuracy", "VerticalAccuracy"},
+    "Metadata": {"Rotation", "Center", "SRSId", "HorizontalAccuracy", "VerticalAccuracy"},
+    "TiePoint": {"Name", "Id", "Position", "Color", "Measurement", "SRSId"},
     "ControlPoint": {
         "Name", "Description", "SRSId", "Category", "Position", "CheckPoint", "HorizontalAccuracy", "VerticalAccuracy",
         "Measurement", "Id",
@@ -158,7 +161,7 @@ class Pose:
     ----------
     rotation : (3, 3) x right, y down, z forwards → world; NaN where unknown. centre : (3,), NaN where unknown.
     observed : (3,) position before the adjustment. sigma : (3,), NaN where not given. system : of that position.
-    left : what of it is not used, in words.
+    left : what of it is not used, in words each.
     """
 
     rotation: np.ndarray
@@ -166,7 +169,7 @@ class Pose:
     observed: np.ndarray
     sigma: np.ndarray
     system: WorldSystem | None
-    left: str = ""
+    left: tuple[str, ...] = ()
 
 
 class Systems:
@@ -310,13 +313,16 @@ def pose_of(photo: XmlPlace, group: Photogroup, systems: Systems, system: WorldS
         turn = rotation
     metadata = pose.child("Metadata")
     observed, observed_in, sigma = unknown, None, unknown
+    words = [left] if left else []
     if metadata is not None:
+        if metadata.child("Rotation") is not None:
+            words.append("the rotation before the adjustment")
         observed = _xyz(metadata.child("Center"))
         observed_in, sigma = systems.of(metadata, system), _sigma(metadata)
-    elif rotation is None and not left:
-        # [L] a pose may be limited to what GNSS gave
+    elif rotation is None:
+        # [L] a pose without a rotation that can be used may be limited to what GNSS gave
         observed, observed_in, sigma = centre, system, _sigma(pose)
-    return Pose(turn, centre, observed, sigma, observed_in, left)
+    return Pose(turn, centre, observed, sigma, observed_in, tuple(words))
 
 
 def _xyz(place: XmlPlace | None) -> np.ndarray:

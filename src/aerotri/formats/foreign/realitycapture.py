@@ -21,7 +21,11 @@ COLUMNS = ("name", "x", "y", "alt", "heading", "pitch", "roll")
 
 def is_realitycapture(path: Path) -> bool:
     """Whether a comment of the file names the columns."""
-    return any(_names(line)[: len(COLUMNS)] == list(COLUMNS) for line in first_lines(path, 4, comments=False))
+    return any(_is_header(_names(line)) for line in first_lines(path, 4, comments=False))
+
+
+def _is_header(names: list[str]) -> bool:
+    return names[: len(COLUMNS)] == list(COLUMNS)
 
 
 def _names(line: str) -> list[str]:
@@ -37,6 +41,11 @@ def read_realitycapture(path: FilePath) -> OrientationList:
         With the line: a row that is too short, no number, a photograph twice.
     """
     file = TextFile(Path(path))
+    header = next(
+        (names for line in first_lines(file.path, 4, comments=False) if _is_header(names := _names(line))), None
+    )
+    if header is None:
+        raise file.error(0, "does not name its columns", f"begin it with #{','.join(COLUMNS)}")
     words = file.words(",")
     rows = list(range(len(words)))
     if not rows:
@@ -48,7 +57,6 @@ def read_realitycapture(path: FilePath) -> OrientationList:
     file.check_names(names, rows, "photograph")
     file.refuse_repeated(names, rows, "photograph")
     values = file.table([words[row][1 : len(COLUMNS)] for row in rows], rows, "value").reshape(-1, 6)
-    header = next(_names(line) for line in first_lines(file.path, 4, comments=False) if _names(line)[:1] == ["name"])
     others = header[len(COLUMNS) :]
     said = left_behind(f"{file.path.name}: not used: {', '.join(others)[:120]}; state the camera with --camera")
     return OrientationList(

@@ -241,6 +241,7 @@ def _in_target(xyz: np.ndarray, system: WorldSystem, target: str, geoid: FilePat
         return topocentric_frame(target, np.array(system.origin), geoid).from_local(xyz)
     plain = georeference(system.crs, np.zeros((0, 3)))
     known = np.isfinite(xyz).all(axis=1)
-    geographic = np.full_like(xyz, np.nan)
-    geographic[known] = plain.from_geocentric(xyz[known])
-    return placing.to_crs(geographic, system.crs, target, geoid) if known.all() else geographic
+    found = np.full_like(xyz, np.nan)
+    if known.any():
+        found[known] = placing.to_crs(plain.from_geocentric(xyz[known]), system.crs, target, geoid)
+    return found
