@@ -72,6 +72,12 @@ def changed(files: dict[str, bytes], name: str, change) -> dict[str, bytes]:
     return files | {name: json.dumps(content).encode()}
 
 
+def write(folder, files: dict[str, bytes]) -> None:
+    for name, raw in files.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(raw)
+
+
 def set_in(*keys, value):
     def change(content):
         for key in keys[:-1]:
@@ -90,6 +96,12 @@ def set_in(*keys, value):
         ("calibrated-cameras.json", set_in("sensors", 0, "internals", "focal_length_px", value=-1), "no camera has"),
         ("calibrated-cameras.json", set_in("cameras", 0, "position", value=[1, 2]), "no list of 3 numbers"),
         ("calibrated-cameras.json", set_in("cameras", 0, "id", value=1.5), "is no whole number"),
+        ("input-cameras.json", set_in("sensors", 0, "image_size_px", value=[4000]), "no list of 2 numbers"),
+        ("input-cameras.json", set_in("sensors", 0, "image_size_px", value=[4000.5, 3000]), "no format"),
+        ("input-cameras.json", set_in("captures", 0, "id", value=[1]), "is no identifier"),
+        ("projected-input-cameras.json", set_in("captures", 0, "id", value=[1]), "is no identifier"),
+        ("scene-reference-frame.json", set_in("base_to_canonical", "swap_xy", value=True), "counts east and north"),
+        ("scene-reference-frame.json", set_in("crs", "definition", value="EPSG:5513"), "counts south and west"),
         ("camera-list.json", set_in("cameras", value=[]), "holds no photograph"),
         ("input-cameras.json", set_in("sensors", 0, "pixel_size_um", value=0), "size of a pixel"),
         ("scene-reference-frame.json", set_in("base_to_canonical", "scale", value=[1, 1, 2]), "to one unit"),
@@ -106,9 +118,7 @@ def set_in(*keys, value):
     ],
 )
 def test_what_is_refused(tmp_path, name, change, says):
-    for other, raw in changed(OpfProject().files(), name, change).items():
-        (tmp_path / other).parent.mkdir(exist_ok=True)
-        (tmp_path / other).write_bytes(raw)
+    write(tmp_path, changed(OpfProject().files(), name, change))
     with pytest.raises(InputError, match=says) as caught:
         read_opf(tmp_path / "project.opf")
     assert caught.value.file is not None
@@ -118,10 +128,42 @@ def test_what_is_refused(tmp_path, name, change, says):
 def test_a_constant_geoid_height(tmp_path):
     """[L] heights above a constant geoid are ellipsoidal after its height is added."""
     files = changed(OpfProject().files(), "scene-reference-frame.json", set_in("crs", "geoid_height", value=48.0))
-    for other, raw in files.items():
-        (tmp_path / other).parent.mkdir(exist_ok=True)
-        (tmp_path / other).write_bytes(raw)
+    write(tmp_path, files)
     block = read_opf(tmp_path).block
     sample = OpfProject()
     np.testing.assert_allclose(block.images.centre, sample.utm(sample.centre) + [0, 0, 48.0], rtol=0, atol=1e-6)
     np.testing.assert_allclose(block.control.xyz, sample.utm(sample.points[55:]) + [0, 0, 48.0], rtol=0, atol=1e-6)
+
+
+def test_a_system_of_two_dimensions_in_feet(tmp_path):
+    """[L] the heights of EPSG:6434 count in feet, as X and Y do; sizes may be written as numbers with a point."""
+    foot = 1200.0 / 3937.0
+    files = changed(OpfProject().files(), "input-cameras.json", set_in("sensors", 0, "image_size_px", value=[4e3, 3e3]))
+    files = changed(files, "scene-reference-frame.json", set_in("crs", "definition", value="EPSG:6434"))
+    write(tmp_path, files)
+    block, sample = read_opf(tmp_path).block, OpfProject()
+    assert block.crs == "EPSG:6433"
+    np.testing.assert_allclose(block.images.centre, sample.utm(sample.centre) * foot, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(block.control.xyz, sample.utm(sample.points[55:]) * foot, rtol=0, atol=1e-6)
+
+
+LOCAL = (
+    'ENGINEERINGCRS["site",ENGINEERINGDATUM["corner"],CS[Cartesian,3],AXIS["x",east,ORDER[1]],AXIS["y",north,ORDER[2]],'
+    'AXIS["z",up,ORDER[3]],LENGTHUNIT["metre",1.0]]'
+)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_local_frame_with_positions_on_the_earth(tmp_path, known):
+    """Positions of photographs that lead nowhere do not stop the rest; a frame may have no file at all."""
+    files = changed(OpfProject(projected=False).files(), "input-control-points.json", set_in("gcps", value=[]))
+    files = changed(files, "scene-reference-frame.json", set_in("crs", "definition", value=LOCAL))
+    if not known:
+        items = json.loads(files["project.opf"])["items"]
+        k = [item["type"] for item in items].index("scene_reference_frame")
+        files = changed(files, "project.opf", set_in("items", k, "resources", value=[]))
+    write(tmp_path, files)
+    reading = read_opf(tmp_path)
+    assert reading.block.crs == "local"
+    assert reading.block.gnss_ins is None or not len(reading.block.gnss_ins)
+    assert any(text.startswith("not used: 6 positions of photographs") for text in reading.messages)

@@ -16,7 +16,7 @@ from aerotri.crs_text import plan_of
 from aerotri.formats.assembly.parts import Reading, no_sigma
 from aerotri.formats.foreign.opensfm_json import Node
 from aerotri.formats.foreign.opf_cameras import Photographs, photographs_of
-from aerotri.formats.foreign.opf_files import REMEDY, Resources, container_of, entries, whole
+from aerotri.formats.foreign.opf_files import REMEDY, Resources, container_of, entries, identifier, whole
 from aerotri.formats.foreign.opf_points import MatchedPoints, input_points, marks_of, tie_points
 from aerotri.formats.foreign.reconstruction import Reconstruction, check_names
 from aerotri.formats.foreign.world_systems import WorldSystem, coordinates_in, world_system
@@ -24,6 +24,7 @@ from aerotri.formats.text.notes import assumed, left_behind, taken
 from aerotri.formats.text.tables import LARGEST_NUMBER, SMALLEST_POSITIVE
 from aerotri.observations import Block, Control, GnssIns
 
+EAST_FIRST, NORTH_FIRST = ("east", "north"), ("north", "east")
 UNEQUAL = 1e-6
 """Relative difference between the units of the axes above which they are not one [C]."""
 ACCURACY = 1.0
@@ -86,11 +87,19 @@ def read_opf(path: FilePath, pixel_um: float | None = None, geoid: FilePath | No
 
 
 def _frame(resources: Resources) -> _Frame:
+    if not resources.has("scene-reference-frame"):
+        # [L] a frame of which nothing is known has no file
+        return _Frame(WorldSystem(note="nothing is known of the coordinate system and the scale"), (0.0, 0.0, 0.0), 1.0)
     node = resources.node("scene-reference-frame")
     crs, change = node.get("crs"), node.get("base_to_canonical")
     system = _system(crs)
     if system.kind == "degrees":
         raise crs.error("counts in degrees, which a scene does not", REMEDY)
+    if system.kind == "plane" and change.has("swap_xy"):
+        axes, swapped = _axes(crs), change.get("swap_xy").value
+        if axes and swapped != (axes == NORTH_FIRST):
+            message = f"swap_xy is {str(swapped).lower()}, but the system counts {' and '.join(axes)}"
+            raise change.error(message, REMEDY)
     scale = np.array(change.get("scale").numbers(3))
     if scale.min() < SMALLEST_POSITIVE:
         raise change.error("a scale is not greater than 0", REMEDY)
@@ -102,8 +111,11 @@ def _frame(resources: Resources) -> _Frame:
 
 
 def _system(crs: Node) -> WorldSystem:
-    """The system of a definition; a constant height of the geoid makes its heights ellipsoidal."""
-    system = world_system(crs.get("definition").text(), crs.path)
+    """The system of a definition; a constant height of the geoid makes its heights ellipsoidal.
+
+    [L] The heights of a system of two dimensions count in the unit of X and Y.
+    """
+    system = world_system(crs.get("definition").text(), crs.path, heights_as_plan=True)
     if system.kind not in ("plane", "degrees", "local"):
         raise crs.error(f"{system.in_words} cannot be used", "export the project in a projected system")
     return replace(system, crs=plan_of(system.crs)) if crs.has("geoid_height") and system.crs else system
@@ -144,7 +156,7 @@ def _with_control(
 ) -> tuple[Block, list[str]]:
     if not gcps:
         return block, []
-    xyz, sigma = _places(resources, "projected-control-points", "projected_gcps", "id", gcps, frame, geoid)
+    xyz, sigma = _places(_projected(resources, "projected-control-points", "projected_gcps"), gcps, frame, geoid)
     is_check = np.array([bool(node.get("is_checkpoint").value) for node in gcps])
     found = Control(np.arange(len(gcps)), xyz, sigma, is_check)
     accuracies = {mark.get("accuracy").number() for gcp in gcps for mark in entries(gcp.get("marks"))} - {ACCURACY}
@@ -155,22 +167,34 @@ def _with_control(
 def _with_positions(
     block: Block, resources: Resources, frame: _Frame, photographs: Photographs, geoid: FilePath | None
 ) -> tuple[Block, list[str]]:
-    captures, rows = [], []
+    captures, rows, placeless = [], [], 0
+    projected = _projected(resources, "projected-input-cameras", "captures")
     for capture in entries(resources.node("input-cameras").get("captures")):
         row = photographs.row.get(whole(capture.get("reference_camera_id")), -1)
-        if capture.has("geolocation") and row >= 0:
-            captures.append(capture)
-            rows.append(row)
+        if not capture.has("geolocation") or row < 0:
+            continue
+        if identifier(capture.get("id")) not in projected and _leads_nowhere(capture, frame):
+            placeless += 1
+            continue
+        captures.append(capture)
+        rows.append(row)
+    words = f"not used: {counted(placeless, 'position')} of photographs on the earth; the project is in local axes"
+    said: list[str] = [left_behind(words)] if placeless else []
     if not captures:
-        return block, []
-    xyz, sigma = _places(resources, "projected-input-cameras", "captures", "id", captures, frame, geoid)
+        return block, said
+    xyz, sigma = _places(projected, captures, frame, geoid)
     unknown = no_sigma(len(rows))
     observed = GnssIns(np.array(rows, np.int64), xyz, sigma, unknown, unknown, unknown[:, 0])
-    said: list[str] = [taken(f"{counted(len(rows), 'position')} of photographs used as observations")]
+    said.append(taken(f"{counted(len(rows), 'position')} of photographs used as observations"))
     angles = sum(capture.has("orientation") for capture in captures)
     if angles:
         said.append(left_behind(f"not used: {counted(angles, 'orientation')} before the calibration"))
     return replace(_on_datum(block), gnss_ins=observed), said
+
+
+def _leads_nowhere(capture: Node, frame: _Frame) -> bool:
+    """Whether a position is on the earth, and the project in local axes."""
+    return frame.system.kind == "local" and _system(capture.get("geolocation").get("crs")).kind != "local"
 
 
 def _on_datum(block: Block) -> Block:
@@ -179,19 +203,17 @@ def _on_datum(block: Block) -> Block:
 
 
 def _places(
-    resources: Resources,
-    projected: str,
-    section: str,
-    key: str,
-    nodes: list[Node],
-    frame: _Frame,
-    geoid: FilePath | None,
+    projected: dict[int | str, Node], nodes: list[Node], frame: _Frame, geoid: FilePath | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and σ, (n, 3) m each: those that Pix4D brought to the processing system, else the original ones."""
+    """Coordinates and σ, (n, 3) m each: those that Pix4D brought to the processing system, else the original ones.
+
+    Parameters
+    ----------
+    projected : places in the processing system by identifier.
+    """
     xyz, sigma = no_sigma(len(nodes)), no_sigma(len(nodes))
-    own = _projected(resources, projected, section, key)
     for k, node in enumerate(nodes):
-        found = own.get(node.get(key).value)
+        found = projected.get(identifier(node.get("id")))
         if found is not None:
             xyz[k] = frame.unmoved(np.array([found.get("coordinates").numbers(3)]))[0]
             sigma[k] = np.array(found.get("sigmas").numbers(3)) * frame.to_metre
@@ -202,7 +224,7 @@ def _places(
     return xyz, sigma
 
 
-def _projected(resources: Resources, name: str, section: str, key: str) -> dict[object, Node]:
+def _projected(resources: Resources, name: str, section: str) -> dict[int | str, Node]:
     """Places in the processing system by identifier."""
     if not resources.has(name):
         return {}
@@ -210,7 +232,7 @@ def _projected(resources: Resources, name: str, section: str, key: str) -> dict[
     for node in entries(resources.node(name).get(section)):
         place = node.get("geolocation") if node.has("geolocation") else node
         if place.has("coordinates"):
-            found[node.get(key).value] = place
+            found[identifier(node.get("id"))] = place
     return found
 
 
@@ -218,7 +240,7 @@ def _original(place: Node, frame: _Frame, geoid: FilePath | None) -> tuple[np.nd
     """Coordinates and σ in the system of the block, of a place in one of its own, whose axes come in its order."""
     crs = place.get("crs")
     system = _system(crs)
-    order = [1, 0, 2] if _north_first(crs.get("definition").text()) else [0, 1, 2]
+    order = [1, 0, 2] if system.kind != "local" and _axes(crs) == NORTH_FIRST else [0, 1, 2]
     xyz = np.array(place.get("coordinates").numbers(3))[order]
     sigma = np.array(place.get("sigmas").numbers(3))[order]
     found = coordinates_in(xyz[None], system, frame.crs, place.path, geoid)[0]
@@ -226,15 +248,24 @@ def _original(place: Node, frame: _Frame, geoid: FilePath | None) -> tuple[np.nd
     return found + np.array([0.0, 0.0, _geoid_height(crs, system)]), sigma * np.array(in_metres)
 
 
-def _north_first(definition: str) -> bool:
-    """Whether a system counts north, or the latitude, before east."""
+def _axes(crs: Node) -> tuple[str, ...]:
+    """Where X and Y of a system count to; nothing where the definition does not tell.
+
+    Raises
+    ------
+    InputError
+        When that is neither east and north nor north and east.
+    """
     from pyproj import CRS
     from pyproj.exceptions import CRSError
 
     try:
-        return CRS.from_user_input(definition).axis_info[0].direction == "north"
-    except (CRSError, IndexError):
-        return False
+        axes = tuple(axis.direction for axis in CRS.from_user_input(crs.get("definition").text()).axis_info[:2])
+    except CRSError:
+        return ()
+    if axes and axes not in (EAST_FIRST, NORTH_FIRST):
+        raise crs.error(f"the system counts {' and '.join(axes)}", "export the project in a system of east and north")
+    return axes
 
 
 def _about(resources: Resources, gcps: list[Node], mtps: list[Node], points: tuple[MatchedPoints, ...]) -> list[str]:

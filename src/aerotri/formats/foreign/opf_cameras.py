@@ -117,7 +117,10 @@ def _cameras(
 
 
 def _camera(sensor: Node, internals: Node, name: str, pixel_um: float | None) -> tuple[Camera, list[str]]:
-    width, height = (whole(node) for node in entries(sensor.get("image_size_px"))[:2])
+    sides = sensor.get("image_size_px").numbers(2)
+    if any(side % 1.0 for side in sides):
+        raise sensor.error("width and height are no format", REMEDY)
+    width, height = map(int, sides)
     size_um = sensor.get("pixel_size_um").number() if pixel_um is None else pixel_um
     if size_um < SMALLEST_POSITIVE:
         raise sensor.error("the size of a pixel is not greater than 0", REMEDY)

@@ -132,6 +132,18 @@ def whole(node: Node) -> int:
     return node.value
 
 
+def identifier(node: Node) -> int | str:
+    """A number or a text that names something.
+
+    Raises
+    ------
+    InputError
+    """
+    if isinstance(node.value, bool) or not isinstance(node.value, int | str):
+        raise node.error("is no identifier", REMEDY)
+    return node.value
+
+
 class Gltf:
     """The arrays of a glTF file.
 

@@ -59,8 +59,12 @@ class WorldSystem:
         return "earth-centred coordinates" if self.kind == "earth" else system_in_words(self.crs)
 
 
-def world_system(definition: str, path: Path) -> WorldSystem:
+def world_system(definition: str, path: Path, heights_as_plan: bool = False) -> WorldSystem:
     """The system of a text: EPSG codes, PROJ, WKT, or ``ENU:latitude,longitude``; local where it is empty.
+
+    Parameters
+    ----------
+    heights_as_plan : whether the heights of a system of two dimensions count in the unit of X and Y.
 
     Raises
     ------
@@ -82,6 +86,9 @@ def world_system(definition: str, path: Path) -> WorldSystem:
         raise InputError(error.message, error.remedy, path) from error
     if found is None:
         raise InputError(f"the coordinate system '{text[:80]}' is not known", REMEDY, path)
+    if heights_as_plan and np.isnan(found.height_to_metre):
+        note = f"{found.note}; heights count in the unit of X and Y"
+        found = replace(found, height_to_metre=found.plan_to_metre, note=note)
     return _of_stated(found, text, path)
 
 
