@@ -234,6 +234,22 @@ def test_errors(tmp_path, change, says):
     assert caught.value.file is not None
 
 
+@pytest.mark.parametrize("read", [read_metashape_project, read_metashape_markers])
+@pytest.mark.parametrize("tag", ["camera_crs", "markers_reference"])
+def test_systems_of_cameras_and_markers(tmp_path, read, tag):
+    """The chunk's own system may be repeated; another one, in which coordinates count, is refused."""
+    path = Sample("utm").write(tmp_path, ".xml")
+    text = path.read_text()
+    own = re.search(r"<reference>(PROJCS.*?)</reference>", text)
+    assert own is not None
+    path.write_text(text.replace(own[0], f"{own[0]}<{tag}>{own[1]}</{tag}>"))
+    read(path)
+    path.write_text(text.replace(own[0], f"{own[0]}<{tag}>{own[1].replace('25832', '25833')}</{tag}>"))
+    with pytest.raises(InputError, match="another coordinate system") as caught:
+        read(path)
+    assert tag in caught.value.message
+
+
 def damaged_archive(path, name, content):
     """The archive with one file other, or missing where the content is None."""
     with zipfile.ZipFile(path) as file:

@@ -50,7 +50,7 @@ def nvm(lens: str = "visualsfm", fixed: bool = False) -> str:
     lines = [f"NVM_V3 FixedK {FOCAL} 2000 {FOCAL} 1500" if fixed else "NVM_V3 ", "", "6"]
     for k in range(6):
         values = [FOCAL, *quaternion(CAMERA_FROM_WORLD[k]).tolist(), *CENTRES[k].tolist(), r]
-        lines.append(f"DJI {k}.JPG " + " ".join(map(repr, values)) + " 0")
+        lines.append(f'DJI"{k}.JPG ' + " ".join(map(repr, values)) + " 0")
     at = np.array([measured(k, lens) for k in range(6)])
     seen, xy = (np.abs(at) < np.array(SIZE) / 2).all(axis=2), at.tolist()
     lines += ["", str(len(POINTS))]
@@ -84,6 +84,7 @@ def test_without_a_size(tmp_path):
     path.write_text(nvm())
     reading = aerotri.read(path)
     assert any("--camera-size" in text for text in reading.messages)
+    assert any(text.startswith("the photographs have 1 camera: ") for text in reading.messages)
 
 
 @pytest.mark.parametrize(
@@ -93,7 +94,7 @@ def test_without_a_size(tmp_path):
         ("\n6\n", "\n7\n", "is no camera"),
         ("\n60\n", "\n600000\n", "more than the file has"),
         ("255 255 255 ", "255 255 255 1", "other than the measurements"),
-        ("DJI 1", "DJI 0", "called 'DJI 0.JPG'"),
+        ('DJI"1', 'DJI"0', "called 'DJI 0.JPG'"),
         (f"{FOCAL} ", "0 ", "no camera has"),
     ],
 )

@@ -133,6 +133,7 @@ def geographic(xyz: np.ndarray) -> tuple[float, float, float]:
         ({"observations": [{"shot_id": "a"}, {"shot_id": "a"}]}, "twice in photograph 'a'"),
         ({"id": "gcp_02"}, "called 'gcp_02'"),
         ({"id": " "}, "cannot be the name"),
+        ({"observations": [{"projection": [0.1, 0.1]}]}, "has no shot_id"),
     ],
 )
 def test_errors(write, change, says):
@@ -143,3 +144,10 @@ def test_errors(write, change, says):
         read_opensfm_gcp(path)
     assert caught.value.file == path
     assert caught.value.remedy
+    assert "reconstruction" not in caught.value.remedy
+
+
+def test_a_position_that_is_empty_is_none(write):
+    content = json.loads(json.dumps(GCP))
+    content["points"][0]["position"] = {}
+    assert read_opensfm_gcp(write(content)).points.tolist() == ["gcp_02"]

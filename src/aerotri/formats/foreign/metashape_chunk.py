@@ -36,6 +36,7 @@ from aerotri.observations import Camera, Prior
 TRUE = ("true", "1", "yes")
 ACCURACIES = {"tiepoints": 1.0, "projections": 0.1, "markers": 0.005, "cameras": 10.0}
 """Settings and their values in a new project: pixels, pixels, m, m."""
+SYSTEMS = ("GEOGCS[", "PROJCS[", "GEOCCS[", "COMPD_CS[", "LOCAL_CS[", "VERT_CS[")
 AUTHORITY = re.compile(r'AUTHORITY\["EPSG","(\d{1,6})"\]\]\s*$')
 
 
@@ -278,9 +279,14 @@ def crs_of(chunk: Element, path: Path) -> str:
     Raises
     ------
     InputError
-        For a system without a code.
+        For a system without a code, or when cameras or markers count in another one.
     """
     text = text_of(chunk.find("reference"))
+    for part in chunk:
+        words, what = text_of(part), part.tag.lower()
+        if words.startswith(SYSTEMS) and words != text and ("camera" in what or "marker" in what):
+            message = f"<{part.tag[:40]}>: it counts in another coordinate system than the chunk"
+            raise InputError(message, "choose one for the chunk, cameras and markers (reference settings)", path)
     if not text or text.startswith("LOCAL_CS"):
         return "local"
     found = AUTHORITY.search(text)

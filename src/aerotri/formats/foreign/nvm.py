@@ -78,6 +78,11 @@ def read_nvm(path: FilePath, pixel_um: float = 1.0, size_px: tuple[int, int] | N
     lenses = [PixelLens(*row) for row in np.unique(model.cameras[:, [0, 8]], axis=0).tolist()]
     place = {lens: k for k, lens in enumerate(lenses)}
     of_image = np.array([place[PixelLens(*row)] for row in model.cameras[:, [0, 8]].tolist()], np.int64)
+    if len(model.names) > 1:
+        words = (
+            f"the photographs have {counted(len(lenses), 'camera')}: those of one f and one radial distortion share it"
+        )
+        said.append(assumed(words))
     if size_px is None and fixed is None:
         said.append(assumed("the format is as small as the image points allow: state it with --camera-size"))
     sizes = _sizes(model, of_image, fixed, size_px)
@@ -146,7 +151,8 @@ def _model(file: TextFile) -> tuple[_Model, list[str]]:
         words = _words(file, k)
         if len(words) <= CAMERA_VALUES or not all_numbers(words[-CAMERA_VALUES:]):
             raise file.error(min(k, len(file) - 1), "is no camera of name and 10 numbers", REMEDY)
-        names.append(" ".join(words[:-CAMERA_VALUES]).strip('"'))
+        # VisualSFM writes a blank of a name as a quotation mark
+        names.append(" ".join(words[:-CAMERA_VALUES]).strip('"').replace('"', " "))
         values.append([float(word) for word in words[-CAMERA_VALUES:-1]])
     if not count:
         raise file.error(row, "holds no photographs", REMEDY)

@@ -85,7 +85,7 @@ def read_openmvg(path: FilePath, pixel_um: float = 1.0) -> Reading:
 
 
 def root_of(path: Path) -> Node:
-    return Node(read_foreign_json(path, REMEDY), "the file", path)
+    return Node(read_foreign_json(path, REMEDY), "the file", path, REMEDY)
 
 
 def list_of(node: Node) -> list[Node]:
@@ -94,7 +94,7 @@ def list_of(node: Node) -> list[Node]:
         return []
     if not isinstance(node.value, list):
         raise node.error("is no list", REMEDY)
-    return [Node(value, f"{node.where}[{k}]"[:120], node.path) for k, value in enumerate(node.value)]
+    return [node.at(value, f"{node.where}[{k}]"[:120]) for k, value in enumerate(node.value)]
 
 
 def number_of(node: Node) -> float:

@@ -44,7 +44,7 @@ def read_opensfm_gcp(path: FilePath) -> PointList:
         Naming the point: something is missing or no number, a point twice in a photograph, a role that is not known.
     """
     path = Path(path)
-    root = Node(read_foreign_json(path, REMEDY), "the file", path)
+    root = Node(read_foreign_json(path, REMEDY), "the file", path, REMEDY)
     system = _system(root)
     metric = bool(system.crs) and is_projected(plan_of(system.crs))
     points = _list(root.get("points"))
@@ -53,7 +53,7 @@ def read_opensfm_gcp(path: FilePath) -> PointList:
     image, point, xy = [], [], []
     for row, entry in enumerate(points):
         name = _name(entry.get("id"))
-        entry = Node(entry.value, f"point '{name[:60]}'", path)
+        entry = root.at(entry.value, f"point '{name[:60]}'")
         names.append(name)
         xyz.append(_position(entry, PLACES[metric]))
         is_check.append(_is_check(entry))
@@ -124,7 +124,7 @@ def _system(root: Node) -> StatedSystem:
 def _list(node: Node) -> list[Node]:
     if not isinstance(node.value, list):
         raise node.error("is no list", REMEDY)
-    return [Node(value, f"{node.where}[{k}]", node.path) for k, value in enumerate(node.value)]
+    return [node.at(value, f"{node.where}[{k}]") for k, value in enumerate(node.value)]
 
 
 def _name(node: Node) -> str:
@@ -133,9 +133,9 @@ def _name(node: Node) -> str:
 
 def _position(point: Node, keys: tuple[str, str, str]) -> list[float]:
     """X, Y, Z or longitude, latitude, height; NaN where unknown."""
-    if not point.has("position"):
+    place = point.get("position") if point.has("position") else None
+    if place is None or place.value == {}:
         return [np.nan] * 3
-    place = point.get("position")
     x, y = place.get(keys[0]).number(), place.get(keys[1]).number()
     if keys[0] == "longitude" and (abs(x) > 360.0 or abs(y) > 90.0):
         raise point.error("its position is no longitude and latitude", "correct it, or name its crs")

@@ -12,6 +12,7 @@ from aerotri.conventions import InputError, counted
 from aerotri.foreign_json import read_foreign_json
 from aerotri.formats.text.notes import left_behind
 
+REMEDY = "export the reconstruction anew"
 LARGEST = 1e9
 """Largest number of a reconstruction; chosen [C]: beyond every coordinate in metres and every pixel; squares of it keep
 their digits."""
@@ -22,21 +23,25 @@ class Node:
 
     Parameters
     ----------
-    value : what it holds. where : its place in words. path : the file.
+    value : what it holds. where : its place in words. path : the file. remedy : what to do where it is damaged.
     """
 
-    def __init__(self, value: Any, where: str, path: Path):
-        self.value, self.where, self.path = value, where, path
+    def __init__(self, value: Any, where: str, path: Path, remedy: str = REMEDY):
+        self.value, self.where, self.path, self.remedy = value, where, path, remedy
 
-    def error(self, message: str, remedy: str = "export the reconstruction anew") -> InputError:
+    def at(self, value: Any, where: str) -> Node:
+        """Another piece of the same file."""
+        return Node(value, where, self.path, self.remedy)
+
+    def error(self, message: str, remedy: str = "") -> InputError:
         """An error that names the place."""
-        return InputError(f"{self.where}: {message}", remedy, self.path)
+        return InputError(f"{self.where}: {message}", remedy or self.remedy, self.path)
 
     def items(self) -> dict[str, Node]:
         """The pieces of a table by name."""
         if not isinstance(self.value, dict):
             raise self.error("is no table")
-        return {key: Node(value, f"{self.where}.{key}"[:120], self.path) for key, value in self.value.items()}
+        return {key: self.at(value, f"{self.where}.{key}"[:120]) for key, value in self.value.items()}
 
     def get(self, key: str) -> Node:
         """A piece of a table; an error where it is missing."""
@@ -65,7 +70,7 @@ class Node:
         """A list of so many numbers."""
         if not isinstance(self.value, list) or len(self.value) != count:
             raise self.error(f"is no list of {count} numbers")
-        return [Node(value, f"{self.where}[{i}]", self.path).number() for i, value in enumerate(self.value)]
+        return [self.at(value, f"{self.where}[{i}]").number() for i, value in enumerate(self.value)]
 
     def text(self) -> str:
         """A text that is not empty."""
@@ -81,7 +86,7 @@ def read_reconstructions(path: Path) -> list[Node]:
     ------
     InputError
     """
-    content = read_foreign_json(path, "export the reconstruction anew")
+    content = read_foreign_json(path, REMEDY)
     if not isinstance(content, list) or not content:
         raise InputError("holds no reconstruction", "it is a list of reconstructions", path)
     return [Node(value, f"reconstruction {i}", path) for i, value in enumerate(content)]

@@ -57,7 +57,7 @@ class Resources:
 
     def __init__(self, path: Path):
         self.path = path
-        root = Node(read_foreign_json(path, REMEDY), "the project", path)
+        root = Node(read_foreign_json(path, REMEDY), "the project", path, REMEDY)
         self.places: dict[str, list[Path]] = {}
         self.of_calibration: dict[str, list[Path]] = {}
         for item in entries(root.get("items")):
@@ -85,7 +85,7 @@ class Resources:
             raise InputError(
                 f"names {count} files of {name.replace('-', ' ')}", "calibrate the project first", self.path
             )
-        return Node(read_foreign_json(found[0], REMEDY), "the file", found[0])
+        return Node(read_foreign_json(found[0], REMEDY), "the file", found[0], REMEDY)
 
     def gltf(self) -> Path | None:
         """The points of the calibration."""
@@ -117,7 +117,7 @@ def entries(node: Node) -> list[Node]:
     """
     if not isinstance(node.value, list):
         raise node.error("is no list", REMEDY)
-    return [Node(value, f"{node.where}[{k}]"[:120], node.path) for k, value in enumerate(node.value)]
+    return [node.at(value, f"{node.where}[{k}]"[:120]) for k, value in enumerate(node.value)]
 
 
 def whole(node: Node) -> int:
@@ -154,7 +154,7 @@ class Gltf:
     """
 
     def __init__(self, path: Path):
-        self.root = Node(read_foreign_json(path, REMEDY), "the file", path)
+        self.root = Node(read_foreign_json(path, REMEDY), "the file", path, REMEDY)
 
     def element(self, section: str, number: Node) -> Node:
         """An element of a list of the file, by the number that another one states."""
