@@ -117,7 +117,8 @@ def export_files() -> tuple[DescribedFile, ...]:
     """The files of the folder, and the layers of result.gpkg."""
     return (
         DescribedFile("result.gpkg", PLACE, "other",
-                      "GeoPackage with the layers listed below and their styles for QGIS.", when="with --to gpkg"),
+                      "GeoPackage with the layers listed below, their styles for QGIS, and a spatial index.",
+                      when="with --to gpkg"),
         DescribedFile("points.parquet", PLACE, "table", "Object points as GeoParquet.",
                       (*POINT_COLUMNS, *GEOMETRY), "with --to geoparquet"),
         DescribedFile("rays.parquet", PLACE, "table",

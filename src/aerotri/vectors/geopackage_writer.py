@@ -35,10 +35,10 @@ CREATE TABLE gpkg_contents (table_name TEXT NOT NULL PRIMARY KEY, data_type TEXT
 CREATE TABLE gpkg_geometry_columns (table_name TEXT NOT NULL, column_name TEXT NOT NULL, geometry_type_name TEXT NOT
  NULL, srs_id INTEGER NOT NULL, z TINYINT NOT NULL, m TINYINT NOT NULL, CONSTRAINT pk_geom_cols PRIMARY KEY
  (table_name, column_name), CONSTRAINT uk_gc_table_name UNIQUE (table_name));
-"""
-DESCRIBED = """
 CREATE TABLE gpkg_extensions (table_name TEXT, column_name TEXT, extension_name TEXT NOT NULL, definition TEXT NOT
  NULL, scope TEXT NOT NULL, CONSTRAINT ge_tce UNIQUE (table_name, column_name, extension_name));
+"""
+DESCRIBED = """
 CREATE TABLE gpkg_data_columns (table_name TEXT NOT NULL, column_name TEXT NOT NULL, name TEXT, title TEXT, description
  TEXT, mime_type TEXT, constraint_name TEXT, CONSTRAINT pk_gdc PRIMARY KEY (table_name, column_name), CONSTRAINT
  gdc_tn UNIQUE (table_name, name));
@@ -51,6 +51,28 @@ INSERT INTO gpkg_extensions VALUES
   'read-write');
 """
 """What columns mean: the schema extension of the standard."""
+INDEX = """
+CREATE VIRTUAL TABLE "rtree_{t}_geom" USING rtree(id, minx, maxx, miny, maxy);
+INSERT INTO gpkg_extensions VALUES
+ ('{t}', 'geom', 'gpkg_rtree_index', 'http://www.geopackage.org/spec120/#extension_rtree', 'write-only');
+"""
+KEEPING_INDEX = """
+CREATE TRIGGER "rtree_{t}_geom_insert" AFTER INSERT ON "{t}" WHEN {placed} BEGIN {enter} END;
+CREATE TRIGGER "rtree_{t}_geom_update1" AFTER UPDATE OF geom ON "{t}" WHEN OLD.fid = NEW.fid AND {placed}
+ BEGIN {enter} END;
+CREATE TRIGGER "rtree_{t}_geom_update2" AFTER UPDATE OF geom ON "{t}" WHEN OLD.fid = NEW.fid AND NOT {placed}
+ BEGIN DELETE FROM "rtree_{t}_geom" WHERE id = OLD.fid; END;
+CREATE TRIGGER "rtree_{t}_geom_update3" AFTER UPDATE ON "{t}" WHEN OLD.fid != NEW.fid AND {placed}
+ BEGIN DELETE FROM "rtree_{t}_geom" WHERE id = OLD.fid; {enter} END;
+CREATE TRIGGER "rtree_{t}_geom_update4" AFTER UPDATE ON "{t}" WHEN OLD.fid != NEW.fid AND NOT {placed}
+ BEGIN DELETE FROM "rtree_{t}_geom" WHERE id IN (OLD.fid, NEW.fid); END;
+CREATE TRIGGER "rtree_{t}_geom_delete" AFTER DELETE ON "{t}" WHEN OLD.geom NOT NULL
+ BEGIN DELETE FROM "rtree_{t}_geom" WHERE id = OLD.fid; END;
+"""
+PLACED = "(NEW.geom NOT NULL AND NOT ST_IsEmpty(NEW.geom))"
+ENTER = """INSERT OR REPLACE INTO "rtree_{t}_geom"
+ VALUES (NEW.fid, ST_MinX(NEW.geom), ST_MaxX(NEW.geom), ST_MinY(NEW.geom), ST_MaxY(NEW.geom));"""
+"""The spatial index, and what keeps it when a program edits the layer: the R-tree extension of the standard."""
 STYLES = """
 CREATE TABLE layer_styles (id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, f_table_catalog TEXT(256), f_table_schema
  TEXT(256), f_table_name TEXT(256), f_geometry_column TEXT(256), styleName TEXT(30), styleQML TEXT, styleSLD TEXT,
@@ -155,6 +177,23 @@ def _enter_layer(database: sqlite3.Connection, layer: Layer, srs: int) -> None:
         return [_blobs(geometries[rows], srs, layer.z), *_lists(columns, rows)]
 
     _enter_rows(database, layer.name, ["geom", *columns], parts, len(geometries))
+    _enter_index(database, layer.name, geometries)
+
+
+def _enter_index(database: sqlite3.Connection, table: str, geometries: np.ndarray) -> None:
+    """The spatial index of a layer; none where this SQLite was built without: the file is whole all the same."""
+    import shapely
+
+    if not database.execute("SELECT sqlite_compileoption_used('ENABLE_RTREE')").fetchone()[0]:
+        return
+    database.executescript(INDEX.format(t=table))
+    for first in range(0, len(geometries), ROWS_AT_A_TIME):
+        bounds = shapely.bounds(geometries[first : first + ROWS_AT_A_TIME]).reshape(-1, 4)
+        placed = np.flatnonzero(np.isfinite(bounds).all(axis=1))
+        rows = bounds[placed][:, [0, 2, 1, 3]].tolist()
+        entries = [(first + 1 + k, *row) for k, row in zip(placed.tolist(), rows, strict=True)]
+        database.executemany(f'INSERT INTO "rtree_{table}_geom" VALUES (?, ?, ?, ?, ?)', entries)
+    database.executescript(KEEPING_INDEX.format(t=table, placed=PLACED, enter=ENTER.format(t=table)))
 
 
 def _enter_rows(
