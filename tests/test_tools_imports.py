@@ -33,6 +33,7 @@ INSIDE = {
     "prove/fuzzing/hostile.py": "damaged files for single readers, and for the commands",
     "prove/fuzzing/readers.py": "damaged files for single readers",
     "prove/league_programs/colmap.py": "gives pycolmap the observations and the datum of an adjustment in its frame",
+    "prove/dmc_centre_offset.py": "adds the pattern by height to image points, which no simulation does",
     "prove/kill.py": "kills the commands from within",
     "prove/deviations.py": "the sizes of image errors that it simulates, parameter by parameter",
     "prove/ppk_interpolation.py": "interpolates a trajectory without photographs",

@@ -8,7 +8,8 @@ the projection centres is determined so weakly that this moved heights by five t
 alone). The adjusted position is free of it, because adjusted observations and residuals are not correlated.
 
 The positions follow the adjustment: adjusted with those of before, evaluated anew, adjusted again, until they stand.
-So do the velocities of photographs with a rolling shutter, which come from the adjusted projection centres.
+So do the velocities of photographs with a rolling shutter, which come from the adjusted projection centres, and the
+heights that a parameter depends on.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerotri.adjustment.height_columns import relief_of
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.robust import Estimator, normalised_lengths, scale_of
 from aerotri.adjustment.solve import INTERRUPTED, Solution, SolveOptions, minimise
@@ -52,7 +54,8 @@ def acts_by_position(system: NormalSystem) -> bool:
 
 def follows_solution(system: NormalSystem) -> bool:
     """Whether something is evaluated anew where the adjustment ended."""
-    return acts_by_position(system) or system.unknowns.scanning is not None
+    u = system.unknowns
+    return acts_by_position(system) or u.scanning is not None or u.linear.heights is not None
 
 
 def at_adjusted_positions(system: NormalSystem, state: State, estimator: Estimator) -> NormalSystem:
@@ -60,9 +63,9 @@ def at_adjusted_positions(system: NormalSystem, state: State, estimator: Estimat
 
     A function of the state alone: the positions begin at the measured ones.
     """
-    system = _on_track(system, state)
+    system = _at_heights(_on_track(system, state), state)
     if not acts_by_position(system):
-        return system
+        return system if system.unknowns.linear.heights is None else _evaluated_at(system, system.unknowns.rays.at)
     rays = system.unknowns.rays
     system = _evaluated_at(system, rays.xy)
     for _ in range(MOST_STEPS):
@@ -102,7 +105,11 @@ def minimise_at_adjusted(
         if solution.status != "converged":
             break
         there = at_adjusted_positions(system, solution.state, solution.estimator)
-        change = max(positions_moved(system, there), _moved_by_velocity(system, there, solution.state))
+        change = max(
+            positions_moved(system, there),
+            _moved_by_velocity(system, there, solution.state),
+            _moved_by_height(system, there, solution.state),
+        )
         unit = unit_of_residuals(system, solution.equations.residual, solution.estimator)
         is_near = round_ == 0 and solution.estimator.is_robust
         if round_ == MOST_ROUNDS - 1 or (change < STANDING * unit and not is_near):
@@ -167,6 +174,29 @@ def _on_track(system: NormalSystem, state: State) -> NormalSystem:
     other = copy(system)
     other.unknowns = replace(u, scanning=scanning)
     return other
+
+
+def _at_heights(system: NormalSystem, state: State) -> NormalSystem:
+    """The system with the heights of a state, for the parameters that depend on them; its columns are as they were."""
+    u = system.unknowns
+    if u.linear.heights is None:
+        return system
+    other = copy(system)
+    relief = relief_of(state.centre, state.points, u.rays.image, u.rays.start)
+    # the first heights come from start values and say nothing of flat ground
+    u.linear.heights.at(relief).refuse_flat_ground()
+    other.unknowns = replace(u, linear=u.linear.at(relief))
+    return other
+
+
+def _moved_by_height(system: NormalSystem, there: NormalSystem, state: State) -> float:
+    """Root mean square change of the image points by the pattern at other heights, in σ."""
+    before, after = system.unknowns.rays, there.unknowns.rays
+    if there.unknowns.linear.heights is None or not len(before.at):
+        return 0.0
+    value = state.shared[after.ap_index[:, -1:]]
+    moved = (after.ap_value[:, :, -1] - before.ap_value[:, :, -1]) * value * after.inv_sigma
+    return float(np.sqrt(np.mean(moved**2)))
 
 
 def _moved_by_velocity(system: NormalSystem, there: NormalSystem, state: State) -> float:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from aerotri.adjustment.height_columns import HeightColumns, Relief
 from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.adjustment.parallel import run_chunks
 from aerotri.conventions import InputError
@@ -241,17 +242,23 @@ class LinearParameters:
     ----------
     families : one record each.
     held : those with a value that is no unknown.
+    heights : the one that depends on the heights of the points; None where there is none.
     """
 
     families: tuple[FamilySets, ...]
     held: HeldParameters
+    heights: HeightColumns | None = None
 
     def beside(self, family: FamilySets) -> LinearParameters:
-        """These and one more."""
-        return LinearParameters((*self.families, family), self.held)
+        """With one more family."""
+        return replace(self, families=(*self.families, family))
+
+    def at(self, relief: Relief) -> LinearParameters:
+        """With other heights of the rays."""
+        return self if self.heights is None else replace(self, heights=self.heights.at(relief))
 
     def columns(self, xy: np.ndarray) -> LinearColumns:
-        """The columns at positions (m, 2) mm of the rays."""
+        """The columns at positions (m, 2) mm of the rays; what depends on heights comes last."""
         widths = [_width(family.sets) for family in self.families]
         index, value = np.zeros((len(xy), sum(widths)), np.int64), np.zeros((len(xy), 2, sum(widths)))
         begins = range(0, len(xy), RAYS_AT_ONCE)
@@ -262,6 +269,9 @@ class LinearParameters:
                 _fill_columns(family.sets, family.of_ray[rays], xy[rays], index[rays, :end], value[rays, :, :end])
 
         run_chunks(fill, len(begins), len(xy))
+        if self.heights is not None:
+            place, pattern = self.heights.columns(xy)
+            return LinearColumns(np.hstack([index, place]), np.concatenate([value, pattern], axis=2))
         return LinearColumns(index, value)
 
 
@@ -276,7 +286,7 @@ def linear_parameters(block: Block, images: np.ndarray, ray_image: np.ndarray, s
     keys = list(zip(block.images.camera[images].tolist(), groups.tolist(), strict=True))
     number = {key: k for k, key in enumerate(dict.fromkeys(keys))}
     of_ray = np.array([number[key] for key in keys], dtype=np.int64)[ray_image]
-    families = []
+    families, heights = [], None
     for family, items in block.settings.adjustment.additional_parameters:
         if family in LINEAR_FAMILIES:
             first: dict[str, int] = {}
@@ -292,7 +302,21 @@ def linear_parameters(block: Block, images: np.ndarray, ray_image: np.ndarray, s
                     _refuse_other_values(shared, chosen, first[group])
                     sets[key] = chosen, first[group]
             families.append(FamilySets(sets, of_ray))
-    return LinearParameters(tuple(families), HeldParameters(_held_sets(block, number), of_ray))
+            heights = _height_columns(family, families[-1]) or heights
+    return LinearParameters(tuple(families), HeldParameters(_held_sets(block, number), of_ray), heights)
+
+
+def _height_columns(family: str, chosen: FamilySets) -> HeightColumns | None:
+    """The column of the item of a family that depends on heights; None where it is not chosen."""
+    for item in LINEAR_FAMILIES[family].needs_height:
+        sets = {
+            key: (one.camera, first + one.items.index(item))
+            for key, (one, first) in chosen.sets.items()
+            if item in one.items
+        }
+        if sets:
+            return HeightColumns(family, item, sets, chosen.of_ray)
+    return None
 
 
 def _held_sets(block: Block, number: dict[tuple[int, str], int]) -> dict[int, list[tuple[ParameterSet, np.ndarray]]]:

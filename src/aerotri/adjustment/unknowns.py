@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.adjustment.height_columns import relief_of
 from aerotri.adjustment.kernel_records import RayArrays, Scans
 from aerotri.adjustment.photograph_fields import add_photograph_fields
 from aerotri.adjustment.photograph_pairs import ordered, photograph_pairs
@@ -290,6 +291,8 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
     if on_rigs is not None:
         tied = np.stack([on_rigs.lead[on_rigs.tied], on_rigs.tied], axis=1)
     scanning = scanning_of(block, images, shared, start.centre[images], start.rotation[images])
+    if linear.heights is not None:
+        linear = linear.at(relief_of(start.centre[images], start.points[points], ray_image, row_start))
     columns = linear.columns(at)
     rays = Rays(
         row_start, ray_image, lens.of_image[ray_image], xy, at, 1.0 / block.image_points.sigma.take(source, axis=0),

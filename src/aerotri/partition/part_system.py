@@ -15,6 +15,7 @@ from aerotri.adjustment.start_values import given_start
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import State
 from aerotri.conventions import InputError
+from aerotri.functional_model.additional_parameters import FAMILIES
 from aerotri.observations import Block
 from aerotri.partition.placing import refuse_partly_known
 
@@ -96,6 +97,13 @@ def refuse_what_parts_cannot(block: Block) -> None:
     """
     s = block.settings
     refuse_robust(s.adjustment.robust)
+    for family, items in s.adjustment.additional_parameters:
+        by_height = [item for item in items if item in FAMILIES[family].needs_height]
+        if by_height:
+            raise InputError(
+                f"{family}.{by_height[0]} counts from the mean ground of the whole block, which parts do not know",
+                f"leave {family}:{by_height[0]} out, or adjust the block in one piece",
+            )
     refuse_partly_known(block)
     known = np.isfinite(np.hstack([block.images.centre, block.images.angles])).all(axis=1)
     without = block.images.names[np.flatnonzero(~known)[:1]]

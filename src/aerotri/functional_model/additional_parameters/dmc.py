@@ -9,8 +9,8 @@ millimetres; `flight_axis` turns it into the image.
 74–77  radial in a head: −J_H·(ξ, η)·((s_H·ρ)² − 16384)·P, s_H = 162.6 mm / 49.53 mm.
 79     butterfly: a common change of the heads' focal lengths, less what the stitching and the orientation absorb.
 80     one radial parameter for all heads, the sum of 74–77, hence never together with them.
-29     offset of the heads' projection centres: depends on the heights of the points and is therefore no column here,
-       see `centre_offset`.
+29     offset of the heads' projection centres: depends on the heights of the points, see `centre_offset`; 0 at the mean
+       ground, as a pattern of the image.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from aerotri.functional_model.additional_parameters import dmc_heads as heads
 from aerotri.functional_model.additional_parameters.bluh import NORMAL_R_MAX, ZERO_RADIUS_SQUARED
 from aerotri.functional_model.additional_parameters.family import NO_UNIT, Family, per_mm
 from aerotri.functional_model.additional_parameters.native_frame import native_from_image, native_half_format_mm
-from aerotri.functional_model.additional_parameters.terms import Terms, only, turned
+from aerotri.functional_model.additional_parameters.terms import Terms, dense_terms, only, turned
 from aerotri.observations import Camera
 
 SYNCHRONISATION = tuple(str(i) for i in range(30, 34))
@@ -38,6 +38,7 @@ ITEMS = (*SYNCHRONISATION, *ORIENTATION, *RADIAL, "79", "80")
 DEFAULT_ITEMS = ITEMS[:-1]
 """Without 80, which is the sum of 74–77."""
 NEEDS_HEIGHT = ("29",)
+KNOWN = (*ITEMS, *NEEDS_HEIGHT)
 MARKS = {item: "P" for item in ORIENTATION} | {item: "D" for item in (*RADIAL, "79", "80", *NEEDS_HEIGHT)}
 QUADRANT_NAMES = ("upper right", "upper left", "lower left", "lower right")
 DESCRIPTION = {
@@ -218,10 +219,12 @@ def _evaluate(camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool, item
     """Patterns of the head each point lies in, and 79 and 80; up to six columns."""
     turn = native_from_image(camera)
     columns = list(_columns(camera, np.stack([x, y], axis=-1) @ turn.T, items, partials))
+    if not columns:
+        return dense_terms(x, y, 0, partials, lambda x, y, value, partial: None)
     index = np.stack([column[0] for column in columns], axis=1)
     value = np.stack([column[1] for column in columns], axis=2)
     partial = np.stack([column[2] for column in columns if column[2] is not None], axis=2) if partials else None
-    return turned(only(Terms(index, value, partial), ITEMS, items), turn)
+    return turned(only(Terms(index, value, partial), KNOWN, items), turn)
 
 
 def centre_offset(camera: Camera, x: np.ndarray, y: np.ndarray, height: np.ndarray, above: np.ndarray) -> np.ndarray:
@@ -259,4 +262,5 @@ FAMILY = Family(
     marks=MARKS,
     check_items=check_items,
     needs_height=NEEDS_HEIGHT,
+    at_heights=centre_offset,
 )

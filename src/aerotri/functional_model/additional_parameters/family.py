@@ -35,6 +35,17 @@ class Evaluate(Protocol):
     ) -> Terms: ...
 
 
+class AtHeights(Protocol):
+    """Pattern (n, 2) of the item that depends on heights, at image points (n,) mm.
+
+    `flying` (n,) m is the flying height over the mean ground, `above` (n,) m the height of the point over it.
+    """
+
+    def __call__(
+        self, camera: Camera, x: np.ndarray, y: np.ndarray, flying: np.ndarray, above: np.ndarray, /
+    ) -> np.ndarray: ...
+
+
 @dataclass(frozen=True, eq=False)
 class Family:
     """A family of additional parameters.
@@ -51,7 +62,8 @@ class Family:
     marks : of items whose mark is not that of the family.
     sizes : where the family comes in sizes, as in legendre:4x4.
     check_items : refuses items that exclude each other.
-    needs_height : items that depend on the heights of the points and are no pattern of the image.
+    needs_height : items that depend on the heights of the points, one at most; as a pattern of the image, at the mean
+        ground, they are 0. at_heights : their pattern.
     is_grid : its items are nodes of a grid, one set of which no single one can be left out.
     """
 
@@ -68,6 +80,7 @@ class Family:
     sizes: Sizes | None = None
     check_items: Callable[[Sequence[str]], None] | None = None
     needs_height: tuple[str, ...] = ()
+    at_heights: AtHeights | None = None
     is_grid: bool = False
 
     @property

@@ -30,6 +30,8 @@ def reason_against(name: str, model: str) -> str:
         return f"values of '{parameter.family}', nodes of a grid, cannot be given"
     if not is_item(parameter.family, parameter.item):
         return f"family '{parameter.family}' has no such parameter; `aerotri explain parameters` lists them"
+    if parameter.item in family.needs_height:
+        return f"{name} depends on the heights of the points: its value cannot be given"
     if family.camera_model not in (None, model):
         return f'family \'{parameter.family}\' belongs to model = "{family.camera_model}", this camera is "{model}"'
     return ""

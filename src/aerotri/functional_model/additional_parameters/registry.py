@@ -162,10 +162,6 @@ def checked_items(family: str, items: Iterable[str]) -> tuple[str, ...]:
     """
     checked, wanted = FAMILIES[family], dict.fromkeys(items)
     for item in wanted:
-        if item in checked.needs_height:
-            raise InputError(
-                f"{family}.{item} depends on the heights of the points and is no pattern of the image", "leave it out"
-            )
         if item not in _places(family, _size_in_name(family, item)):
             raise InputError(f"'{family}' has no parameter '{item}'", items_text(family))
     if wanted and checked.check_items is not None:
@@ -183,13 +179,14 @@ def _size_in_name(family: str, item: str) -> tuple[int, int] | None:
 def _places(family: str, size: tuple[int, int] | None) -> dict[str, int]:
     """Place of every item, by its name, in the family or among the items of a size."""
     sizes = sizes_of(family)
-    known = FAMILIES[family].items if size is None or sizes is None else sizes.items(size)
+    own = FAMILIES[family]
+    known = (*own.needs_height, *own.items) if size is None or sizes is None else sizes.items(size)
     return {item: place for place, item in enumerate(known)}
 
 
 def items_text(family: str) -> str:
     """What a family has to offer, for messages."""
-    known, sizes = FAMILIES[family].items, sizes_of(family)
+    known, sizes = (*FAMILIES[family].needs_height, *FAMILIES[family].items), sizes_of(family)
     if sizes is not None:
         return (
             f"it has sizes from {size_text(sizes.smallest)} to {size_text(sizes.largest)}, as in "

@@ -154,6 +154,8 @@ def _parametric_parts(camera: Camera, errors: ErrorSpec) -> list[Field]:
         if not is_item(family, item):
             items = LINEAR_FAMILIES[family].items
             raise InputError(f"'{key}' has the unknown key '{name}'", f"'{family}' has {items[0]} to {items[-1]}")
+        if item in LINEAR_FAMILIES[family].needs_height:
+            raise InputError(f"'{key}.{name}' depends on the heights of the points", "leave it out")
         families.setdefault(family, {})[item] = value
     parts: list[Field] = []
     for family, values in families.items():
