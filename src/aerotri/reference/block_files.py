@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from aerotri.reference.adjust_tables import PLACE as RESULT
-from aerotri.reference.block_tables import PLACE as BLOCK_FOLDER
 from aerotri.reference.head import ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.records import DescribedFile, Item, of_axes
 
 SIMULATED = "block of simulate"
+IMPORTED = "folder of convert"
 TRUTH, TIEPOINTS, RUN = "truth of simulate", "block of tiepoints", "folder of run"
 MARKS, PHOTOGRAPHS, PARAMETERS = "control_marks of tiepoints", "photographs of simulate", "folder of parameters"
 COMPARED, DIVIDED = "folder of compare-parameters", "folder of divide"
@@ -245,7 +245,7 @@ def block_files() -> tuple[DescribedFile, ...]:
         ),
         DescribedFile(
             "import.json",
-            BLOCK_FOLDER,
+            IMPORTED,
             "json",
             "What was taken, assumed and left behind when the block was read from other files.",
             IMPORT_JSON,
