@@ -14,13 +14,9 @@ from aerotri.formats.assembly.by_stamps import named_by_stamps
 from aerotri.formats.assembly.camera_spec import CameraSpec, cameras_of
 from aerotri.formats.assembly.imported import (
     CAMERA,
-    CONTROL,
-    ORIENTATIONS,
     PHOTOGRAPHS,
-    POSITIONS,
     ImportSource,
-    source_of_list,
-    sources_of_stamps,
+    sources_of_lists,
 )
 from aerotri.formats.assembly.parts import PointList, PositionList
 from aerotri.tie_points.given import Given
@@ -107,17 +103,9 @@ def sources_of_photographs(
         When a file is no longer there.
     """
     reading = kinds.options_of(files.stated)
-    of_positions = reading.beside_control() if files.control else reading
     models = ", ".join(one.name for one in photographs.cameras) if camera is None else ""
     found = [ImportSource(str(folder), PHOTOGRAPHS, "EXIF and XMP", models)]
-    for text, known, holds, how in (
-        (files.control, kinds.CONTROL, CONTROL, reading),
-        (files.positions, kinds.POSITIONS, POSITIONS, of_positions),
-        (files.orientation, kinds.ORIENTATIONS, ORIENTATIONS, reading),
-    ):
-        if text:
-            found.append(source_of_list(text, known, holds, how))
-    found += sources_of_stamps(files.positions, files.time_stamps, photographs.folder)
+    found += sources_of_lists(files, reading, photographs.folder)
     if camera is not None:
         found.append(ImportSource(str(camera), CAMERA))
     return tuple(found)

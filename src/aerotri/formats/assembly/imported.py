@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -180,10 +180,35 @@ def source_of_list(text: str, known: kinds.Kinds, holds: str, options: ReadingOp
     return ImportSource(str(path), holds, kind or "", program_of(kind))
 
 
-def sources_of_stamps(positions: str, time_stamps: str, photographs: Path | None = None) -> list[ImportSource]:
-    """The files of time stamps that a trajectory was read at; see `kinds.read_position_list`."""
-    paths = kinds.files_of_stamps(positions, time_stamps, photographs)
-    return [ImportSource(str(path), TIMES, kinds.DJI_MRK, program_of(kinds.DJI_MRK)) for path in paths]
+class ListFiles(Protocol):
+    """What names the lists of an import: `kind:PATH` or PATH each, '' where there is none."""
+
+    @property
+    def control(self) -> str: ...
+    @property
+    def positions(self) -> str: ...
+    @property
+    def orientation(self) -> str: ...
+    @property
+    def time_stamps(self) -> str: ...
+
+
+def sources_of_lists(files: ListFiles, options: ReadingOptions, photographs: Path | None = None) -> list[ImportSource]:
+    """Orientations, positions and control points, and the time stamps that a trajectory was read at.
+
+    Parameters
+    ----------
+    photographs : their folder, where time stamps are looked for too; see `kinds.read_position_list`.
+    """
+    of_positions = options.beside_control() if files.control else options
+    lists = (
+        (files.orientation, kinds.ORIENTATIONS, ORIENTATIONS, options),
+        (files.positions, kinds.POSITIONS, POSITIONS, of_positions),
+        (files.control, kinds.CONTROL, CONTROL, options),
+    )
+    sources = [source_of_list(text, known, holds, how) for text, known, holds, how in lists if text]
+    stamps = kinds.files_of_stamps(files.positions, files.time_stamps, photographs)
+    return sources + [ImportSource(str(path), TIMES, kinds.DJI_MRK, program_of(kinds.DJI_MRK)) for path in stamps]
 
 
 def sources_of(request: Request) -> tuple[ImportSource, ...]:
@@ -198,15 +223,7 @@ def sources_of(request: Request) -> tuple[ImportSource, ...]:
     kind, path = kind_of_source(request)
     found = [_main_source(kind, path, options)]
     found += [source_of_list(text, kinds.RAYS, RAYS, options) for text in request.image_points]
-    of_positions = options.beside_control() if request.control else options
-    for text, known, holds, how in (
-        (request.orientation, kinds.ORIENTATIONS, ORIENTATIONS, options),
-        (request.positions, kinds.POSITIONS, POSITIONS, of_positions),
-        (request.control, kinds.CONTROL, CONTROL, options),
-    ):
-        if text:
-            found.append(source_of_list(text, known, holds, how))
-    found += sources_of_stamps(request.positions, request.time_stamps)
+    found += sources_of_lists(request, options)
     if request.camera.file is not None:
         found.append(ImportSource(str(request.camera.file), CAMERA))
     return tuple(found)
