@@ -18,6 +18,10 @@ from aerotri.functional_model.rotation import angles_from_rotation, rotation_fro
 from aerotri.observations import Block, Control, GnssIns, Images
 from aerotri.observations.block import Constraints
 
+FAR_SIZES = 10.0
+"""Distance between start values and what is observed, in sizes of the larger area, beyond which they are in other axes
+[C]: photographs of one block lie above its control."""
+
 
 def frame_of_block(block: Block, geoid: FilePath | None = None, origin: np.ndarray | None = None) -> LocalFrame:
     """The local frame of a block with a CRS: around its control points, projection centres and GNSS positions.
@@ -26,10 +30,38 @@ def frame_of_block(block: Block, geoid: FilePath | None = None, origin: np.ndarr
     ----------
     geoid, origin : see `local_frame`.
     """
-    places = [block.control.xyz, block.images.centre]
-    if block.gnss_ins is not None:
-        places.append(block.gnss_ins.xyz)
-    return local_frame(block.crs, np.concatenate(places), geoid, origin)
+    return local_frame(block.crs, places_of(_observed_places(block), block.images.centre), geoid, origin)
+
+
+def _observed_places(block: Block) -> np.ndarray:
+    """(n, 3) control points and GNSS positions."""
+    return np.concatenate([block.control.xyz, *([] if block.gnss_ins is None else [block.gnss_ins.xyz])])
+
+
+def starts_elsewhere(block: Block) -> bool:
+    """Whether start values of photographs are in axes of their own: far from control points and GNSS positions."""
+    return _is_elsewhere(block.images.centre, _observed_places(block))
+
+
+def places_of(observed: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """(n, 3) where a block lies in its CRS: what is observed, and start values of photographs unless in other axes.
+
+    Start values of other programs count in axes of their own as a rule. Their place says nothing then, and a frame
+    halfway to it would change lengths and σ of what is observed.
+
+    Parameters
+    ----------
+    observed : (k, 3) control points and GNSS positions. start : (m, 3) projection centres. NaN where unknown.
+    """
+    return observed if _is_elsewhere(start, observed) else np.concatenate([observed, start])
+
+
+def _is_elsewhere(start: np.ndarray, observed: np.ndarray) -> bool:
+    one, other = (xyz[np.isfinite(xyz[:, :2]).all(axis=1), :2] for xyz in (start, observed))
+    if not len(one) or not len(other):
+        return False
+    size = max(float(np.ptp(plan, axis=0).max()) for plan in (one, other))
+    return bool(np.linalg.norm(np.median(one, axis=0) - np.median(other, axis=0)) > FAR_SIZES * size)
 
 
 def needs_positions(block: Block) -> bool:

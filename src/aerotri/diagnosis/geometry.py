@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.adjustment.ray_status import RayStatus
+from aerotri.coordinates.blocks import starts_elsewhere
 from aerotri.diagnosis.finding import Finding, doubt, graded, some
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.results.adjusted_block import AdjustedBlock
@@ -56,7 +57,12 @@ def of_depths(adjusted: AdjustedBlock) -> list[Finding]:
 
 
 def of_turns(adjusted: AdjustedBlock) -> list[Finding]:
-    """Photographs turned far from their start values: doubtful only, for the result may be right all the same."""
+    """Photographs turned far from their start values: doubtful only, for the result may be right all the same.
+
+    Start values in axes of their own, as those of COLMAP, turn and move with all of the block: that tells nothing.
+    """
+    if starts_elsewhere(adjusted.block):
+        return []
     order = adjusted.block.rotation
     given = rotation_from_angles(adjusted.block.images.angles, order)
     found = rotation_from_angles(adjusted.images.angles, order)
@@ -74,6 +80,8 @@ def of_turns(adjusted: AdjustedBlock) -> list[Finding]:
 
 def of_ways(adjusted: AdjustedBlock) -> list[Finding]:
     """Photographs moved far from their start values; doubtful only, as in `of_turns`."""
+    if starts_elsewhere(adjusted.block):
+        return []
     way = np.linalg.norm(adjusted.images.centre - adjusted.block.images.centre, axis=1)
     usual = usual_distance(adjusted)
     moved = np.flatnonzero(way > MOVED * usual)

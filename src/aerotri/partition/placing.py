@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.coordinates.blocks import needs_positions
+from aerotri.coordinates.blocks import needs_positions, places_of
 from aerotri.coordinates.georeference import is_projected
 from aerotri.coordinates.local_frame import LocalFrame, local_frame
 from aerotri.formats.block.folder import settings_file
@@ -62,8 +62,9 @@ def place_of(sources: Sequence[Path], geoid: Path | None) -> Place | None:
     centres = np.concatenate([part.images.centre for part in parts])
     # photographs that stand in several parts count once, as in the block
     _, once = np.unique(np.concatenate([part.images.names for part in parts]), return_index=True)
-    observed = [part.gnss_ins.xyz for part in parts if part.gnss_ins is not None]
-    around = np.concatenate([*(part.control.xyz for part in parts), centres[np.sort(once)], *observed])
+    observed = [part.control.xyz for part in parts]
+    observed += [part.gnss_ins.xyz for part in parts if part.gnss_ins is not None]
+    around = places_of(np.concatenate(observed), centres[np.sort(once)])
     around = around[np.isfinite(around[:, :2]).all(axis=1)]
     frame = local_frame(crs[0], around, geoid)
     lon_lat = frame.georeference.horizontal.transform(around[:, 0], around[:, 1])

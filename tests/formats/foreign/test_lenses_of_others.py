@@ -73,10 +73,16 @@ def assert_same(again: Block, block: Block) -> None:
     assert np.nanmax(residuals_at_start(again).residual_px) < 1e-6
 
 
+def of_lens(lost: tuple[str, ...]) -> list[str]:
+    """What is said but of pixels, names and σ, which have nothing to do with the lens."""
+    others = ("size of the pixels", "the names of", "standard deviations")
+    return [text for text in lost if not any(words in text for words in others)]
+
+
 @pytest.mark.parametrize("cameras", [(FISHEYE, WIDE), (PRISM, WIDE)], ids=["opencv", "thin prism"])
 def test_colmap_there_and_back(tmp_path, cameras):
     block, oriented = sample(*cameras)
-    assert write_colmap(oriented, tmp_path / "model") == ()
+    assert not of_lens(write_colmap(oriented, tmp_path / "model"))
     model = pycolmap.Reconstruction(tmp_path / "model")
     for image in model.images.values():
         for point in image.points2D:
@@ -101,13 +107,13 @@ def test_a_rational_lens_keeps_its_denominator_held(tmp_path):
 @pytest.mark.parametrize("fisheye", [FISHEYE, camera("1", 9.0, "fisheye", k1=-0.03, k2=0.004)], ids=["four", "two"])
 def test_opensfm_there_and_back(tmp_path, fisheye):
     block, oriented = sample(fisheye, WIDE)
-    assert write_opensfm(oriented, tmp_path / "model") == ()
+    assert not of_lens(write_opensfm(oriented, tmp_path / "model"))
     assert_same(read_opensfm(tmp_path / "model", pixel_um=5.0).block, block)
 
 
 def test_opensfm_gets_the_nearest_lens_and_says_so(tmp_path):
     block, oriented = sample(FISHEYE, RATIONAL)
-    (said,) = write_opensfm(oriented, tmp_path / "model")
+    (said,) = of_lens(write_opensfm(oriented, tmp_path / "model"))
     best = nearest_lens(RATIONAL, ("k1", "k2", "p1", "p2", "k3"))
     assert f"camera '2': OpenSfM has no words for its lens; the nearest lens is written, {best.text}" == said
     again = read_opensfm(tmp_path / "model", pixel_um=5.0).block

@@ -72,7 +72,7 @@ def test_formulas_of_the_manual(file, projection):
 def test_there_and_back(file, tmp_path, projection):
     (camera,) = cameras_of(CameraSpec(file=file(projection), pixel_um=5.0), (), np.array([]), np.array([]))
     said = write_oriented(oriented_sample(camera), tmp_path / "again.xml", "metashape-camera")
-    assert not said
+    assert all(text.startswith("could not be carried over") and "lens" not in text for text in said)
     again = read_metashape_camera(tmp_path / "again.xml", 5.0)
     assert again.projection == camera.projection
     for own, other in ((again.lens, camera.lens), (again.interior, camera.interior)):

@@ -12,6 +12,8 @@ from aerotri.formats.text.notes import left_behind
 from aerotri.observations import Block
 
 Count = Callable[[Block], int]
+SAME_SIGMA = 1e-9
+"""Relative difference up to which two σ are one [C]: the rounding of units."""
 
 
 def _lens(block: Block) -> int:
@@ -31,15 +33,18 @@ def _control_sigmas(block: Block) -> int:
     return int(np.isfinite(block.control.sigma).any(axis=1).sum())
 
 
+def _not_a_pixel(block: Block) -> int:
+    """Image points whose σ is another than a pixel, which readers take where a format has none."""
+    pixel = np.array([camera.pixel_mm for camera in block.cameras])[block.images.camera[block.image_points.image]]
+    return int((np.abs(block.image_points.sigma / pixel[:, None] - 1.0) > SAME_SIGMA).any(axis=1).sum())
+
+
 THINGS: dict[str, tuple[Count, str]] = {
     "cameras": (lambda block: len(block.cameras), "{camera}, except the name"),
     "principal points": (_principal_points, "the principal point of {camera}"),
     "lens": (_lens, "{lens parameter}; image points are as measured"),
     "image points": (lambda block: len(block.image_points), "{image point}"),
-    "sigmas": (
-        lambda block: len(np.unique(block.image_points.sigma)) - 1,
-        "standard deviations of single image points",
-    ),
+    "sigmas": (_not_a_pixel, "the standard deviations of {image point}, which are read as 1 pixel then"),
     "orientations": (lambda block: int(np.isfinite(block.images.centre).all(axis=1).sum()), "{orientation}"),
     "control": (lambda block: int((~block.control.is_check).sum()), "{control point}"),
     "check points": (lambda block: int(block.control.is_check.sum()), "{check point}"),
@@ -72,10 +77,31 @@ def losses(block: Block, *held: str) -> tuple[str, ...]:
         raise ValueError(f"no such things: {unknown}")
     said = []
     for name, (count, words) in THINGS.items():
-        number = 0 if name in held else count(block)
+        # of what is not there at all nobody misses the σ
+        is_told = name in held or (name == "sigmas" and "image points" not in held)
+        number = 0 if is_told else count(block)
         if number > 0:
             said.append(left_behind(f"could not be carried over: {_with_number(words, number)}"))
     return tuple(said)
+
+
+def lost_names(names: np.ndarray, written: np.ndarray, noun: str) -> tuple[str, ...]:
+    """A sentence on names for which a format has numbers only.
+
+    Parameters
+    ----------
+    names, written : (n,) as they are, and as the format has them.
+    """
+    count = int((names.astype(str) != written.astype(str)).sum())
+    words = f"could not be carried over: the names of {counted(count, noun)}, which are numbered"
+    return (left_behind(words),) if count else ()
+
+
+def lost_pixels(block: Block, read_as_um: float) -> tuple[str, ...]:
+    """A sentence on cameras whose pixels have another size than that which readers of the format take for unknown."""
+    count = sum(camera.pixel_um != read_as_um for camera in block.cameras)
+    words = f"could not be carried over: the size of the pixels of {counted(count, 'camera')}"
+    return (left_behind(words),) if count else ()
 
 
 def _with_number(words: str, number: int) -> str:

@@ -95,6 +95,8 @@ class OrientedBlock:
         ----------
         with_rigs : whether it holds rigs.
         """
+        from aerotri.formats.assembly.losses import THINGS, losses
+
         block = self.block
         lost = []
         if len(block.control):
@@ -103,8 +105,6 @@ class OrientedBlock:
             lost.append(
                 counted(len(block.gnss_ins), "observed position or attitude", "observed positions or attitudes")
             )
-        if len(np.unique(block.image_points.sigma)) > 1:
-            lost.append("the standard deviations of single image points")
         images, rays = int(np.sum(~self.oriented)), int(np.sum(~self.complete))
         if images:
             lost.append(f"{counted(images, 'photograph')} without orientation")
@@ -117,7 +117,8 @@ class OrientedBlock:
             lost.append(f"{counted(rigs, 'rig')}; photographs are written one by one")
         if block.crs != "local":
             lost.append(f"the coordinate system {block.crs}")
-        return tuple(f"could not be carried over: {what}" for what in lost)
+        others = losses(block, *(set(THINGS) - {"sigmas", "edits", "constraints", "fiducials"}))
+        return (*(f"could not be carried over: {what}" for what in lost), *others)
 
 
 def oriented_block(block: Block, points: np.ndarray) -> OrientedBlock:

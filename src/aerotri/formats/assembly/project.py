@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted
-from aerotri.coordinates.blocks import frame_of_block, transform_block
+from aerotri.coordinates.blocks import frame_of_block, starts_elsewhere, transform_block
 from aerotri.diagnosis.suspicions import suspicions_of_lists
 from aerotri.formats import convert
 from aerotri.formats.assembly import kinds, placing
@@ -70,6 +70,9 @@ WITHOUT_SIZE: Mapping[str, Callable[[Path, float, tuple[int, int] | None], Readi
 """Whole blocks that know no format of the photographs either."""
 MAY_FREE = ("blocks-exchange", "colmap", "metashape-project", "opf", "pix4d-params", *WITHOUT_SIZE, *IN_PIXELS)
 """Whole blocks whose interior elements --free-interior makes unknowns."""
+WITHOUT_SIGMA = ("bal", "blocks-exchange", "colmap", "opf", "pix4d-params", *WITHOUT_SIZE, *IN_PIXELS)
+"""Whole blocks whose files have no standard deviation of image points."""
+ABOUT_SIGMA = assumed("the standard deviation of image points is assumed as 1 pixel: state yours with --image-sigma-px")
 CONTROL_BESIDE = (OPENSFM_GCP, "gcp_list.txt")
 """Control points of OpenSfM beside its reconstruction."""
 SHIFTS = ("off", "block", "strip")
@@ -186,7 +189,16 @@ def assembled(request: Request, sources: Sources) -> Reading:
     reading = with_check_points(reading, request.check, request.stated.control_prefix)
     if request.station_pattern:
         reading = _on_rig(reading, request)
-    return _finished(reading, request, whole is None)
+    return _finished(_with_said_sigma(reading, request), request, whole is None)
+
+
+def _with_said_sigma(reading: Reading, request: Request) -> Reading:
+    """A whole block with a note where its format has no σ of image points and none is stated."""
+    kind, _ = kind_of_source(request)
+    stated = request.image_sigma_um is not None or request.image_sigma_px is not None
+    if stated or kind not in WITHOUT_SIGMA or not len(reading.block.image_points):
+        return reading
+    return replace(reading, messages=(*reading.messages, ABOUT_SIGMA))
 
 
 def _on_rig(reading: Reading, request: Request) -> Reading:
@@ -418,8 +430,7 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
         raise InputError("--image-sigma-um and --image-sigma-px exclude each other", "state one of the two")
     if sigma_um is None and (sigma_px is not None or is_new):
         if sigma_px is None and len(rays):
-            about = "the standard deviation of image points is assumed as 1 pixel: state yours with --image-sigma-px"
-            messages.append(assumed(about))
+            messages.append(ABOUT_SIGMA)
         sigma_px = 1.0 if sigma_px is None else sigma_px
         sigma_um = sigma_px * block.cameras[0].pixel_um
         sigma = sigma_in_px(block, rays.image, sigma_px)
@@ -463,7 +474,9 @@ def fit_of_start_values(block: Block, geoid: FilePath | None = None) -> list[str
         return [f"how image points fit the orientations was not computed: {error}"]
     sample = sample_of_points(local)
     found = residuals_at_start(_with_rays(local, sample))
-    control = control_at_start(_with_rays(local, np.flatnonzero(np.isin(rays.point, block.control.point))))
+    # in axes of their own: that control points lie elsewhere is no misfit
+    of_control = np.isin(rays.point, block.control.point) & (not starts_elsewhere(block))
+    control = control_at_start(_with_rays(local, np.flatnonzero(of_control)))
     said = []
     if found.count >= FEWEST:
         chosen = len(np.unique(rays.point[sample]))

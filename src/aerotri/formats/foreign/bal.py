@@ -15,9 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.formats.assembly.losses import lost_names, lost_pixels
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.text.csv_text import read_bytes
+from aerotri.formats.text.notes import left_behind
 from aerotri.formats.text.tables import LARGEST_NUMBER
 from aerotri.formats.text.text_lines import line_of_word
 from aerotri.functional_model.rotation import angles_from_rotation, exponential, logarithm
@@ -246,7 +248,11 @@ def write_bal(oriented: OrientedBlock, path: FilePath) -> tuple[str, ...]:
             file.write(f"{image[k]} {point[k]} {float(xy[k, 0])!r} {float(xy[k, 1])!r}\n")
         for value in np.concatenate([values.ravel(), oriented.points[points].ravel()]).tolist():
             file.write(f"{value!r}\n")
-    return oriented.losses()
+    lost = [*lost_names(block.images.names[images], np.arange(len(images)), "photograph")]
+    lost += lost_names(block.points[points], np.arange(len(points)), "point")
+    if len(np.unique(block.images.camera[images])) < len(images):
+        lost.append(left_behind("could not be carried over: which photographs share a camera"))
+    return (*oriented.losses(), *lost, *lost_pixels(block, PIXEL_UM))
 
 
 def _value(camera: Camera, name: str) -> float:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted, real_path
+from aerotri.formats.assembly.losses import lost_names, lost_pixels
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import Reading, texts
 from aerotri.formats.files.atomic import atomic_folder
@@ -28,6 +29,8 @@ HEADER = "# Bundle file v0.3"
 CAMERA_VALUES = 15
 """Numbers of a camera: f, k1, k2, the rotation matrix, the translation [L: manual of Bundler v0.3]."""
 BUNDLE, LIST = "bundle.out", "list.txt"
+PIXEL_UM = 1.0
+"""Size of a pixel where it is not stated."""
 SKEW = 1e-4
 """Largest deviation of RᵀR from the unit matrix."""
 
@@ -131,7 +134,7 @@ def _check_cameras(numbers: _Numbers, cameras: np.ndarray) -> None:
         raise numbers.error(2 + CAMERA_VALUES * int(negative[0]), "is not a possible principal distance")
 
 
-def read_bundler(path: FilePath, pixel_um: float = 1.0, size_px: tuple[int, int] | None = None) -> Reading:
+def read_bundler(path: FilePath, pixel_um: float = PIXEL_UM, size_px: tuple[int, int] | None = None) -> Reading:
     """A block and its object points; names of photographs from list.txt beside the file or in the folder above.
 
     Photographs with the same f, k1, k2 share a camera. Focal length, k1 and k2 are free, the datum is minimal, the
@@ -277,7 +280,8 @@ def write_bundler(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:
         (place / BUNDLE).write_text("\n".join(lines) + "\n", encoding="ascii", newline="\n")
         names = "\n".join(block.images.names[images].tolist())
         (place / LIST).write_text(names + "\n", encoding="utf-8", newline="\n")
-    return oriented.losses()
+    lost = lost_names(block.points[points], np.arange(len(points)), "point")
+    return (*oriented.losses(), *lost, *lost_pixels(block, PIXEL_UM))
 
 
 def _camera_lines(oriented: OrientedBlock, row: int, camera: Camera) -> list[str]:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted, px_from_mm, whole_number
+from aerotri.formats.assembly.losses import lost_names, lost_pixels
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import no_sigma
 from aerotri.formats.files.atomic import atomic_folder
@@ -41,11 +42,13 @@ from aerotri.formats.foreign.colmap_rigs import (
 from aerotri.observations import Block, Camera, ImagePoints, Images, Prior
 
 OWN_ENTRIES = tuple(f"{name}.{end}" for name in (*FILES, "rigs", "frames") for end in ("txt", "bin"))
+PIXEL_UM = 1.0
+"""Size of a pixel where it is not stated."""
 SPARSE = 8
 """Largest number of an object point, per ray, up to which a table of all numbers is made [C]."""
 
 
-def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndarray]:
+def read_colmap(folder: FilePath, pixel_um: float = PIXEL_UM) -> tuple[Block, np.ndarray]:
     """A block and its object points from a COLMAP model.
 
     Rays are the image points that belong to an object point. Focal lengths and lens parameters are free, principal
@@ -191,6 +194,7 @@ def write_colmap(oriented: OrientedBlock, folder: FilePath, binary: bool = True)
     with atomic_folder(folder, own=OWN_ENTRIES) as place:
         (model.write_binary if binary else model.write_text)(place)
     lost = [*oriented.losses(with_rigs=True), *lost_rigs, *(sentence for _, said in written for sentence in said)]
+    lost += [*lost_names(block.points, point_numbers(block.points), "point"), *lost_pixels(block, PIXEL_UM)]
     single = int(np.sum(rays == 1))
     if single:
         lost.append(f"could not be carried over: {counted(single, 'point')} with one ray")

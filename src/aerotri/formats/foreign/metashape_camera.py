@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.foreign.lens_fit import expressible_camera
@@ -111,7 +112,7 @@ def write_metashape_camera(oriented: OrientedBlock, path: FilePath) -> tuple[str
     camera, said = expressible(one, *oriented.format_errors)
     with atomic_file(path) as place:
         place.write_text(_text(camera), encoding="utf-8", newline="\n")
-    return said
+    return (*losses(oriented.block, "cameras", "principal points", "lens"), *said)
 
 
 def expressible(camera: Camera, errors: np.ndarray | None = None) -> tuple[Camera, tuple[str, ...]]:

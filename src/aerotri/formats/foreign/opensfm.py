@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import FilePath, counted, mm_from_px, px_from_mm, real_path
+from aerotri.formats.assembly.losses import lost_pixels
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import Reading, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_folder
@@ -44,6 +45,8 @@ from aerotri.observations import (
 from aerotri.observations.block import LENS_NAMES
 from aerotri.observations.rigs import STATION
 
+PIXEL_UM = 1.0
+"""Size of a pixel where it is not stated."""
 RECONSTRUCTION, TOPOCENTRIC = "reconstruction.json", "reconstruction.topocentric.json"
 CONFIG = "config.yaml"
 FROZEN = re.compile(rb"^\s*optimize_camera_parameters\s*:\s*(no|false|off)\b", re.IGNORECASE | re.MULTILINE)
@@ -69,7 +72,7 @@ def file_of(path: Path) -> Path:
     return path / (TOPOCENTRIC if (path / TOPOCENTRIC).is_file() else RECONSTRUCTION)
 
 
-def read_opensfm(path: FilePath, pixel_um: float = 1.0) -> Reading:
+def read_opensfm(path: FilePath, pixel_um: float = PIXEL_UM) -> Reading:
     """A block and its object points from reconstruction.json and, beside it, tracks.csv.
 
     Focal lengths and lens parameters are free, the standard deviation is one pixel. GNSS positions are observations
@@ -287,7 +290,8 @@ def write_opensfm(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:
         (place / RECONSTRUCTION).write_text(text, encoding="utf-8", newline="\n")
         (place / TRACKS).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
     said = ("image points are written free of the additional parameters, which OpenSfM has no words for",)
-    return (*oriented.losses(), *(said if freed else ()), *(sentence for _, fitted in written for sentence in fitted))
+    lost = (*oriented.losses(), *lost_pixels(block, PIXEL_UM))
+    return (*lost, *(said if freed else ()), *(sentence for _, fitted in written for sentence in fitted))
 
 
 def _shot_json(oriented: OrientedBlock, row: int) -> dict[str, Any]:
