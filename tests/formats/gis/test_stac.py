@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 import pyproj
+import pystac
 import pytest
 import shapely
 
@@ -58,6 +60,16 @@ def test_files_that_are_there(result, exported, item):
         assert asset["title"]
     assert item["assets"]["result.gpkg"]["href"] == "result.gpkg"
     assert item["assets"]["points.csv"]["type"] == "text/csv"
+
+
+def test_pystac_reads_the_same(exported, item):
+    """The reader of the standard finds the outline, the times and every file."""
+    read = pystac.Item.from_file(str(exported / "item.json"))
+    assert (read.id, read.bbox, read.geometry) == (item["id"], item["bbox"], item["geometry"])
+    assert read.datetime == datetime.fromisoformat(item["properties"]["datetime"])
+    assert {key: Path(asset.get_absolute_href()).resolve() for key, asset in read.assets.items()} == {
+        key: (exported / asset["href"]).resolve() for key, asset in item["assets"].items()
+    }
 
 
 def test_properties(result, item):
