@@ -142,7 +142,7 @@ def _distance(xy: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         (("--subset", "third"), "there is no subset"),
         (("--window", "16"), "a window of 16 pixels is not possible"),
         (("--interval", "wide"), "--interval .wide. is not a number"),
-        (("--breaklines", "lines.shp"), "no known kind"),
+        (("--breaklines", "lines.tab"), "no known kind"),
     ],
 )
 def test_bad_options(made, more, said):

@@ -57,7 +57,7 @@ def test_settings_are_refused(measured):
     for match, options in (
         ("no subset", {"subset": "third"}), ("is not possible", {"window": 16}), ("edge 0.5", {"edge": 0.5}),
         ("threshold 2 is not possible", {"threshold": 2.0}), ("most_photographs 1", {"most_photographs": 1}),
-        ("the area is empty", {"area": (1, 1, 0, 0)}), ("no known kind", {"breaklines": "lines.shp"}),
+        ("the area is empty", {"area": (1, 1, 0, 0)}), ("no known kind", {"breaklines": "lines.tab"}),
     ):  # fmt: skip
         with pytest.raises(InputError, match=match):
             aerotri.terrain(result, photographs, **options)

@@ -399,9 +399,9 @@ def test_a_pile_without_heights_along_its_outline_is_named(tmp_path):
 
 
 def test_a_boundary_of_another_kind_names_those_that_are_read(tmp_path, cone):
-    (tmp_path / "b.kml").write_text("<?xml version='1.0'?><kml/>", encoding="utf-8")
+    (tmp_path / "b.tab").write_text("!table", encoding="utf-8")
     with pytest.raises(InputError, match="is no polygon") as refused:
-        aerotri.volume(cone, tmp_path / "b.kml")
+        aerotri.volume(cone, tmp_path / "b.tab")
     assert all(kind in refused.value.remedy for kind in ("GeoPackage", "GeoJSON", "WKT"))
 
 

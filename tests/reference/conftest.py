@@ -197,7 +197,12 @@ def _written(folder: Path) -> Written:
         run("export", source, "--to", "pdf", *words, out="exported")
     stated = run("accuracy", second, "--class-horizontal", 10, out="accuracy")
     sets = run("compare-parameters", folder / "plain", "--set", "none", "--set", "brown:K1", "--folds", "2", out="sets")
-    checked = run("crosscheck", second, out="checked")
+    # the independent model knows no attitudes
+    write_block(ten_photographs(navigated=False), folder / "unnavigated")
+    unnavigated = run(
+        "adjust", folder / "unnavigated", "--no-plots", "--parameters", "bluh:1-2", out="unnavigated_result"
+    )
+    checked = run("crosscheck", unnavigated, out="checked")
     write_block(small_block(1, "brown:K1", flight=LONG_FLIGHT)[0], folder / "long")
     run("adjust", run("divide", folder / "long", "--parts", 2, out="in_parts"), out="parts_result")
     run("init", folder / "begun")
@@ -215,7 +220,7 @@ def _written(folder: Path) -> Written:
     )
     project = _project(run)
     places = {
-        "block folder": (tiny, folder / "plain", project / "block"),
+        "block folder": (tiny, folder / "plain", project / "block"), "folder of convert": (project / "block",),
         "result of adjust": (first, second, result, of_rig, of_weighted, of_shutter),
         "folder of compare-parameters": (sets,), "folder of halves": (halves,),
         "folder of accuracy": (stated,), "folder of deform": (model, whole),
