@@ -27,7 +27,7 @@ from aerotri.reference.schemas import schema_name, schema_texts
 from aerotri.reference.words import MARKS, WORDS
 
 GROUPS = {
-    "folder of convert": ("convert", "Block folder of `aerotri convert`, `tiepoints` and `run`"),
+    "block of convert": ("convert", "Block folder of `aerotri convert`, `tiepoints` and `run`"),
     "result of adjust": ("adjust", "Result of `aerotri adjust`"),
     "folder of compare-parameters": ("compare_parameters", "Folder of `aerotri compare-parameters`"),
     "folder of halves": ("halves", "Folder of `aerotri halves`"),

@@ -220,7 +220,7 @@ def _written(folder: Path) -> Written:
     )
     project = _project(run)
     places = {
-        "block folder": (tiny, folder / "plain", project / "block"), "folder of convert": (project / "block",),
+        "block folder": (tiny, folder / "plain", project / "block"), "block of convert": (project / "block",),
         "result of adjust": (first, second, result, of_rig, of_weighted, of_shutter),
         "folder of compare-parameters": (sets,), "folder of halves": (halves,),
         "folder of accuracy": (stated,), "folder of deform": (model, whole),

@@ -7,7 +7,7 @@ from aerotri.reference.head import ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.records import DescribedFile, Item, of_axes
 
 SIMULATED = "block of simulate"
-IMPORTED = "folder of convert"
+IMPORTED = "block of convert"
 TRUTH, TIEPOINTS, RUN = "truth of simulate", "block of tiepoints", "folder of run"
 MARKS, PHOTOGRAPHS, PARAMETERS = "control_marks of tiepoints", "photographs of simulate", "folder of parameters"
 COMPARED, DIVIDED = "folder of compare-parameters", "folder of divide"
