@@ -21,6 +21,7 @@ import aerotri
 from aerotri.functional_model.additional_parameters import dmc
 from aerotri.observations import ImagePoints
 from aerotri.simulation import parse_spec, simulate
+from runs_elsewhere import add_executor, runs_of
 
 OFFSET = 0.15
 RELIEF = (0.0, 5.0, 15.0, 50.0, 150.0)
@@ -58,41 +59,38 @@ def height_error(result, true: np.ndarray) -> float:
     return float(np.sqrt(np.nanmean(error**2)))
 
 
-def row(relief: float, seeds: int) -> list[str]:
-    size, without, beside, found, sigma, refused = [], [], [], [], [], ""
-    for seed in range(seeds):
-        block, errors, true = block_of(relief, seed)
-        size.append(np.sqrt(np.mean(errors**2)))
-        without.append(height_error(aerotri.adjust(block, parameters="none"), true))
-        try:
-            result = aerotri.adjust(block, parameters="dmc:29")
-        except aerotri.InputError as error:
-            refused = error.message.partition(",")[2].partition(":")[0].removeprefix(" and ")
-            continue
-        p = result.adjusted.parameters
-        found.append(p.value[0])
-        sigma.append(p.sigma[0])
-        beside.append(height_error(result, true))
-    mean = [f"{np.mean(values):.3f}" if values else "–" for values in (found, sigma, beside)]
-    return [
-        f"{relief:g}",
-        f"{np.mean(size):.2f}",
-        mean[0] if found else refused,
-        mean[1],
-        f"{np.mean(without):.3f}",
-        mean[2],
-    ]
+def run(relief: float, seed: int) -> tuple[float, float, tuple[float, float, float] | str]:
+    """Image errors µm, heights without dmc:29 m; the estimate, its σ and heights with it, or why there is none."""
+    block, errors, true = block_of(relief, seed)
+    size = float(np.sqrt(np.mean(errors**2)))
+    without = height_error(aerotri.adjust(block, parameters="none"), true)
+    try:
+        result = aerotri.adjust(block, parameters="dmc:29")
+    except aerotri.InputError as error:
+        return size, without, error.message.partition(",")[2].partition(":")[0].removeprefix(" and ")
+    p = result.adjusted.parameters
+    return size, without, (float(p.value[0]), float(p.sigma[0]), height_error(result, true))
+
+
+def row(relief: float, outcomes: list[tuple[float, float, tuple[float, float, float] | str]]) -> list[str]:
+    size, without = (np.mean([outcome[k] for outcome in outcomes]) for k in range(2))
+    there = [outcome[2] for outcome in outcomes if not isinstance(outcome[2], str)]
+    refused = next((outcome[2] for outcome in outcomes if isinstance(outcome[2], str)), "")
+    mean = [f"{value:.3f}" for value in np.mean(there, axis=0)] if there else [str(refused), "–", "–"]
+    return [f"{relief:g}", f"{size:.2f}", mean[0], mean[1], f"{without:.3f}", mean[2]]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=4)
-    seeds = parser.parse_args().seeds
+    add_executor(parser)
+    options = parser.parse_args()
     print(f"# Offset of the projection centres of the DMC, {OFFSET} m (tools/prove/dmc_centre_offset.py)\n")
-    print(f"{seeds} blocks a row\n")
+    print(f"{options.seeds} blocks a row\n")
     print("| relief m | image error µm | dmc.29 m | σ m | heights without m | with m |\n|---|---|---|---|---|---|")
-    for relief in RELIEF:
-        print("| " + " | ".join(row(relief, seeds)) + " |", flush=True)
+    with runs_of(options) as runs:
+        for relief in RELIEF:
+            print("| " + " | ".join(row(relief, runs(run, relief, range(options.seeds)))) + " |", flush=True)
 
 
 if __name__ == "__main__":
